@@ -25,12 +25,12 @@ MOST_PROBLEMS = 10
 
 @dataclass(frozen=True, slots=True)
 class Checking:
-    """How a certificate is checked.
+    """Settings of the check of a certificate.
 
     Attributes:
-        cvc5: Whether cvc5 is put what the checker does not settle by itself.
+        cvc5: Whether cvc5 is asked the questions that the checker does not settle by itself.
         strict: Whether it is an error that something was not checked.
-        questions: A folder for what is left, one SMT-LIB file each.
+        questions: A folder for the questions left, one SMT-LIB file each.
     """
 
     cvc5: bool = False
@@ -41,7 +41,7 @@ class Checking:
 def certify(settings: Settings, how: Checking, write: Path | None, against: Path | None) -> Conclusion:
     """Check a certificate, made now or kept, by the checker alone.
 
-    Nothing is proved where a kept one is checked: then what the checker leaves has nobody's word, and is an error.
+    Nothing is proved where a kept one is checked: a question that the checker leaves is then an error, as no prover vouches for it.
     """
     if against is not None:
         return _reviewed(read(settings), _kept(against), replace(how, strict=True))
@@ -60,7 +60,7 @@ def certify(settings: Settings, how: Checking, write: Path | None, against: Path
 
 
 def _kept(path: Path) -> Mapping[str, object] | Diagnostic:
-    """The certificate in a file; anything else there is a diagnostic."""
+    """Read the certificate in a file; anything else there is a diagnostic."""
     try:
         value = json_of(content(path), plain=False)
     except OSError as error:
@@ -73,7 +73,7 @@ def _kept(path: Path) -> Mapping[str, object] | Diagnostic:
 
 
 def _keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...]:
-    """Write a certificate; return why it could not be written."""
+    """Write a certificate; return a diagnostic where it could not be written."""
     text = json.dumps(certificate, separators=(",", ":"), sort_keys=True) + "\n"
     try:
         write_atomically(path, text.encode())
@@ -88,7 +88,7 @@ def _reviewed(
     how: Checking,
     proved: ProvedProgram | None = None,
 ) -> Conclusion:
-    """The report on a certificate of the first root: what is wrong with it, what was checked and what was not.
+    """Report on a certificate of the first root: its problems, and the obligations that were checked and that were not.
 
     The certificate must name the stopping assumptions of what was `proved`, from which executors are made.
     """
@@ -116,7 +116,7 @@ def _reviewed(
 
 
 def _closing(program: Program, outcome: Certified) -> str:
-    """How much was checked, and what that rests on."""
+    """Say how much was checked, and what that rests on."""
     if outcome.problems:
         return "not certified"
     checked, total = len(outcome.checked), len(outcome.checked) + len(outcome.unchecked)
@@ -128,7 +128,7 @@ def _closing(program: Program, outcome: Certified) -> str:
 
 
 def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
-    """Write what is left, one file a question; return why a file could not be written."""
+    """Write the questions left, one file each; return a diagnostic where a file could not be written."""
     for number, unchecked in enumerate(outcome.unchecked, start=1):
         path = folder / f"{number:03}.smt2"
         text = f"; {unchecked.name}\n; unsat: it holds\n{unchecked.question}"
@@ -141,7 +141,7 @@ def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
 
 
 def _cvc5(question: str) -> CaseAnswer:
-    """cvc5's answer, which has no part in the proof."""
+    """Return the answer of cvc5, which has no part in the proof."""
     return {"unsat": CaseAnswer.NONE, "sat": CaseAnswer.SOME}.get(cvc5_says(question), CaseAnswer.UNKNOWN)
 
 

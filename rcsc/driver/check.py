@@ -21,7 +21,7 @@ _WORD = re.compile(r"\w+")
 
 
 def check(settings: Settings) -> Report:
-    """Prove every table; of those that a system's levels run, say what is known of the levels together."""
+    """Prove every table; for those that a system's levels run, tell what the proof of the levels together shows."""
     cache = _cache(settings)
     report = _unread_elsewhere(_checked(settings, cache))
     if cache is None or not any(systems_above(table.file) for table in report.tables):
@@ -32,7 +32,7 @@ def check(settings: Settings) -> Report:
 
 
 def _checked(settings: Settings, cache: Cache | None) -> Report:
-    """Every table by itself; an unchanged project is recognised without being parsed."""
+    """Prove every table by itself; an unchanged project is recognised without being parsed."""
     whole = None if settings.stdin is not None else cache
     known = recall(whole, settings.paths, settings.options) if whole else None
     if known is not None:
@@ -49,7 +49,7 @@ def _checked(settings: Settings, cache: Cache | None) -> Report:
 
 
 def _unread_elsewhere(report: Report) -> Report:
-    """The report without warnings of what the project's other files, or its systems, may read."""
+    """Return the report without warnings about names that the project's other files, or its systems, may read."""
     told = {each.primary.span.file for each in report.diagnostics if each.code in _UNREAD}
     shared = {file for file in told if used_elsewhere(file)}
     named = {file: _words(_descriptions(file)) for file in told - shared}
@@ -64,7 +64,7 @@ def _unread_elsewhere(report: Report) -> Report:
 
 
 def _descriptions(file: str) -> Iterator[Path]:
-    """What may describe a system of which the file is a part: TOML beside it and above, as far as its project goes."""
+    """Yield files that may describe a system with this file: TOML beside it and above, as far as its project goes."""
     here, top = Path(os.path.dirname(file) or ".").resolve(), Path(project_root(file)).resolve()
     for folder in (here, *here.parents):
         yield from sorted(folder.glob("*.toml"))
@@ -74,7 +74,7 @@ def _descriptions(file: str) -> Iterator[Path]:
 
 
 def _words(files: Iterable[Path]) -> set[str]:
-    """All words of the texts."""
+    """Collect all words of the files."""
     words: set[str] = set()
     for file in files:
         with suppress(OSError, Malformed):  # it is none then that anybody runs

@@ -32,7 +32,7 @@ def compile_(
     only_check: bool,
     defensive: bool = False,
 ) -> Conclusion:
-    """Prove every table anew, then write the executors and the C of systems, or say whether they are fresh.
+    """Prove every table anew, then write the executors and the C of systems, or tell whether they are fresh.
 
     Args:
         settings: Which tables and systems, and how they are proved. A system is given by its description, or by the folder that holds it.
@@ -79,7 +79,7 @@ def compile_system(path: Path, *, only_check: bool = False) -> Conclusion:
 
 
 def systems_in(paths: Iterable[str]) -> Iterator[Path]:
-    """The descriptions of systems among the paths: those that are one, and those of folders that hold one."""
+    """Yield the descriptions of systems among the paths: files that are one, and those in folders."""
     for path in map(Path, paths):
         if path.suffix == ".toml" and path.name != PROJECT_FILE and path.is_file():
             yield path
@@ -88,7 +88,7 @@ def systems_in(paths: Iterable[str]) -> Iterator[Path]:
 
 
 def tables_in(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
-    """The paths that tables are read from: those given that are no descriptions, and the programs of the levels, which are roots."""
+    """Return the paths to read tables from: those given that are no descriptions, and the programs of the systems' levels."""
     given = [path for path in paths if Path(path) not in systems]
     tried = (places(path, spec.program) for path in systems for spec in description(path).levels)
     levels = (next((file for file in files if file.is_file()), None) for files in tried)
@@ -96,7 +96,7 @@ def tables_in(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, .
 
 
 def _folder(systems: tuple[Path, ...]) -> Path:
-    """The generated folder that the systems' descriptions name, as seen from here; without systems the usual one."""
+    """Return the generated folder that the systems' descriptions name, as seen from here; without systems the usual one."""
     folders = {description(path).generated for path in systems}
     if len(folders) > 1:
         names = " and ".join(f"`{folder}`" for folder in sorted(folders))
@@ -125,14 +125,14 @@ class Generated:
     _names: dict[str, dict[str, tuple[str, str]]] = field(default_factory=dict)
 
     def add_program(self, root: str, program: ProvedProgram) -> None:
-        """Adds the executors of a program that declares a table or a level."""
+        """Add the executors of a program that declares a table or a level."""
         plan = self.plans[os.path.realpath(root)] = planned(program, defensive=self.defensive)
         if self._add(root, emitted(plan, self.targets)):
             for name in self.targets:
                 self._share(root, name, TARGETS[name].outward(plan))
 
     def add_system(self, path: Path) -> None:
-        """Adds the C of a system whose programs were added.
+        """Add the C of a system whose programs were added.
 
         Raises:
             BadDescription: It does not fit them.
@@ -157,7 +157,7 @@ class Generated:
             self._share(str(path), "c", outward(whole))
 
     def _add(self, root: str, files: Mapping[str, str]) -> bool:
-        """Adds files, if no other text goes to one of them already; types that programs share have one text."""
+        """Add files, if no other text goes to one of them already; types that programs share have one text."""
         for path, text in files.items():
             other, there = self._paths.get(path.casefold(), (root, text))
             if there != text:
@@ -168,7 +168,7 @@ class Generated:
         return True
 
     def _share(self, root: str, target: str, names: Iterable[tuple[str, str]]) -> None:
-        """Notes the first name that is shared with another root, or given to two things."""
+        """Report the first name that another root has, too, for another thing."""
         known = self._names.setdefault(target, {})
         for name, what in names:
             other, other_what = known.setdefault(name, (root, what))
@@ -183,7 +183,7 @@ class Generated:
 
 
 def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:
-    """How the executors of a proved program are laid out."""
+    """Make the plan of a proved program's executors."""
     root = project_root(proved.program.file)
     return lower(proved, root, defensive=defensive, prefix=prefix(root))
 

@@ -30,21 +30,21 @@ if TYPE_CHECKING:
 
 
 def known(system: Path, cache: Cache) -> KnownSystem | None:
-    """What is known of a system as its files stand; None where no level was ever proved into the cache, or it is not in order."""
+    """Return the kept verdicts on a system as its files stand; None where the cache never had a proved level, or it is not in order."""
     system_outline = outlined(system.parent.resolve() / system.name, cache) if any_kept(cache) else None
     return None if system_outline is None else standing(cache, system_outline)
 
 
 @dataclass(frozen=True, slots=True)
 class _Outlined:
-    """An outline, and what stood at every place that was looked at for it."""
+    """An outline, with the digests of all places that were looked at for it."""
 
     outline: SystemOutline
     looked_at: dict[str, str]
 
 
 def outlined(system: Path, cache: Cache) -> SystemOutline | None:
-    """The system's outline; `system` is absolute."""
+    """Return the system's outline; `system` is absolute."""
     kept = cache.load(_Outlined, str(system))
     if kept is not None and as_before(kept.looked_at) is not None:
         return kept.outline
@@ -58,7 +58,7 @@ def outlined(system: Path, cache: Cache) -> SystemOutline | None:
 
 
 def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] | None":
-    """TransitionSystems of all levels, and what they were read from; None where they cannot be, or a file has changed meanwhile."""
+    """Return the transition systems of all levels, and the digests of their files; None where one is not in order, or has just changed."""
     from rcsc.compose.proof.system import NoProgramError, loaded_program, transition_systems_of
 
     looked_at = {str(system): digest_at(str(system))}
@@ -79,14 +79,14 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """What is said of a system that is proved, and what stood at every place that was looked at for it."""
+    """The lines about a proved system, with the digests of all places that were looked at for them."""
 
     lines: tuple[str, ...]
     looked_at: dict[str, str]
 
 
 def recall_lines(cache: Cache, system: Path, key: tuple[str, ...]) -> tuple[str, ...] | None:
-    """Return what is said of the system as its files stand, where that was kept under this key.
+    """Return the lines kept under this key, if the system's files are unchanged.
 
     Raises:
         BadDescription: The description says something that cannot be, by now.
@@ -106,9 +106,9 @@ def keep_lines(
     stood: str,
     loaded: "Mapping[str, Loaded]",
 ) -> None:
-    """Keep what is said of a system, unless one of its files has changed meanwhile.
+    """Keep the lines about a system, unless one of its files has changed meanwhile.
 
-    The description stood as the digest says before it was read; the programs are by name as they were loaded.
+    `stood` is the description's digest from before it was read; the programs are by name as they were loaded.
     """
     looked_at = {str(system): stood}
     for program, files in loaded.items():
@@ -121,7 +121,7 @@ def keep_lines(
 
 
 def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
-    """The outline of all levels."""
+    """Make the outline of all levels."""
     from rcsc.compose.proof.assume_guarantee import promises
     from rcsc.compose.proof.candidates import content
 

@@ -16,7 +16,7 @@ from rcsc.lang.resolve import closure, resolve
 
 @dataclass(frozen=True, slots=True)
 class Proved:
-    """The files, and what became of each root."""
+    """The files, and the proof of each root."""
 
     loaded: Loaded
     proofs: tuple[Proof, ...]
@@ -32,7 +32,7 @@ class Proved:
         return Report(tuple(sorted(every, key=sort_key)), tables, self.loaded.sources)
 
     def unread(self) -> Iterator[Diagnostic]:
-        """Warn of what the programs declare and do not read."""
+        """Yield warnings of names that the programs declare and do not read."""
         from rcsc.proof.table.findings.unread import unread  # keep lazy: `rcsc check` alone asks
 
         for proof in self.proofs:
@@ -51,19 +51,19 @@ class Proved:
 
 @uncollected()
 def proved(settings: Settings, cache: Cache | None = None) -> Proved:
-    """Read, resolve and prove; with a cache only what it does not know."""
+    """Read, resolve and prove; with a cache only what it does not have."""
     loaded = read(settings)
     return Proved(loaded, tuple(_proofs(loaded, settings, cache)))
 
 
 def read(settings: Settings) -> Loaded:
-    """The files, and all that they use."""
+    """Load the files, and all that they use."""
     settings.progress("reading")
     return load(settings.paths, settings.stdin)
 
 
 def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterator[Proof]:
-    """Resolve and prove each root; findings of its files where it cannot be resolved."""
+    """Resolve and prove each root; where it cannot be resolved, give the findings of its files."""
     for root in loaded.roots:
         settings.progress(f"proving {root}")
         program = resolve(root, loaded)

@@ -32,7 +32,7 @@ _CLOSING = re.compile(r"^[ \t]*\}", re.MULTILINE)
 
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
-    """Prove a program's tables, procedures and invariants; with a cache only what is not known."""
+    """Prove a program's tables, procedures and invariants; with a cache only those that it does not have."""
     cells = sum(len(table.lines) * len(table.columns) for table in program.tables)
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
     if cache is None:
@@ -62,7 +62,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """What is known of a table: its report and the notes on it."""
+    """A table in the cache: its report and the notes on it."""
 
     report: TableReport
     notes: tuple[Diagnostic, ...]
@@ -70,7 +70,7 @@ class _Kept:
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """Nothing is wrong in a program but for its tables."""
+    """A mark in the cache: nothing is wrong in a program but for its tables."""
 
 
 def _proof(
@@ -101,11 +101,11 @@ class _Memory:
         self.common = hashlib.sha256("\n".join(map(repr, parts)).encode()).hexdigest()
 
     def rest(self) -> bool:
-        """Whether all but the tables is known to be right."""
+        """Return whether all but the tables is known to be right."""
         return self.cache.load(_Rest, self.common) is not None
 
     def table(self, table: Table) -> _Kept | None:
-        """What is known of the table."""
+        """Return the kept report and notes of the table."""
         kept = self.cache.load(_Kept, *self._key(table))
         if kept is None:
             return None
@@ -146,7 +146,7 @@ class _Memory:
 
 
 def _extent(table: Table, text: str) -> Span:
-    """From the table's name to the brace that closes it, which begins a line: rows begin with a bar."""
+    """Return the span from the table's name to its closing brace, which begins a line: rows begin with a bar."""
     closing = _CLOSING.search(text, table.span.end)
     return Span(table.span.file, table.span.start, closing.end() if closing else len(text))
 
@@ -162,7 +162,7 @@ def _spans(diagnostic: Diagnostic) -> list[Span]:
 
 
 def moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
-    """The diagnostic for a text that starts elsewhere."""
+    """Return the diagnostic for a text that starts elsewhere."""
 
     def span(old: Span) -> Span:
         return Span(file, old.start + by, old.end + by)
@@ -182,7 +182,7 @@ def moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
 
 
 def table_report(verdict: TableVerdict, program: Program) -> TableReport:
-    """A verdict as the report shows it."""
+    """Turn a verdict into the table's part of the report."""
     backing, stops = verdict.backing, verdict.table.stops
     checked = [assumption.name for assumption in program.assumptions if assumption.standing.checked]
     tells = [name for name in checked if name in verdict.table.assumptions and name not in stops]
@@ -201,7 +201,7 @@ def table_report(verdict: TableVerdict, program: Program) -> TableReport:
 
 
 def _verdict(verdict: TableVerdict) -> Verdict:
-    """What a table is: refuted where anything is wrong with it, though something else was left open."""
+    """Return the verdict in one word: refuted where anything is wrong, though something else was left open."""
     if any(isinstance(finding, SolversDisagree) for finding in verdict.findings):
         return Verdict.UNDECIDED
     if verdict.refuted:

@@ -25,14 +25,14 @@ from rcsc.lang.written.upgrade import Upgraded, upgrade
 
 @dataclass(frozen=True, slots=True)
 class Formatted:
-    """What became of the files.
+    """The result for the files.
 
     Attributes:
-        report: Not formatted files where nothing was to be written; what could not be read or written.
+        report: Files that are not formatted, where nothing was to be written; files that could not be read or written.
         texts: Each file's new text.
         diff: How the files differ from it.
         changed: How many differ.
-        upgraded: What was upgraded and what was left, in words.
+        upgraded: Forms that were upgraded and those that were left, in words.
     """
 
     report: Report
@@ -71,7 +71,7 @@ def reformat(
 
 
 def expand(paths: tuple[str, ...], stdin: bytes | None, *, width: int = WIDTH) -> Formatted:
-    """The files as their tables are resolved: what `above` comes to in each line stands in a column of its own.
+    """Return the files with their tables as resolved: the tests that `above` adds to a line stand in a column of their own.
 
     Nothing is written. A file whose program has errors is left out, and they are reported.
     """
@@ -102,7 +102,7 @@ def _expanded(file: tree.File, program: Program) -> tree.File:
 
 
 def _upgraded(paths: tuple[str, ...], stdin: bytes | None, names: list[str]) -> Upgraded:
-    """The files upgraded, as far as no program of their projects comes to mean something else."""
+    """Upgrade the files, as far as no program of their projects changes its meaning."""
     folders = dict.fromkeys(project_root(name) for name in names if name != "-")
     whole = load((*paths, *folders), stdin)
     return upgrade(whole, [name for name in names if name in whole.files])
@@ -114,7 +114,7 @@ def _of(diagnostic: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) 
 
 
 def _text(name: str, before: tree.File, width: int) -> str:
-    """The file's new text, which says the same.
+    """Format the file; its new text must parse to the same tree.
 
     Raises:
         RuntimeError: It does not; that is a bug.
@@ -126,7 +126,7 @@ def _text(name: str, before: tree.File, width: int) -> str:
 
 
 def _unformatted(source: Source, text: str, older: bool) -> Diagnostic:
-    """At the first place that would change."""
+    """Return a diagnostic at the first place that would change."""
     start = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(source.text, text, strict=False)))
     place = Span(source.name, min(start, len(source.text)), min(start + 1, len(source.text)))
     return Diagnostic(

@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 
 def silent(_doing: str) -> None:
-    """No progress is shown."""
+    """Show no progress."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What to work on and how.
+    """The files to work on, and how.
 
     Attributes:
         paths: Files, folders, or `-`.
-        stdin: What `-` stands for.
+        stdin: The text that `-` stands for.
         use_cache: Whether earlier proofs may be used and new ones kept.
-        progress: Told what is being done; an empty text when it is over.
+        progress: Called with what is being done; with an empty text when it is over.
     """
 
     paths: tuple[str, ...]
@@ -45,7 +45,7 @@ class Conclusion:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What became of one root file.
+    """The result for one root file.
 
     Attributes:
         program: None where it does not resolve.
@@ -63,7 +63,7 @@ class Proof:
 
 @dataclass(frozen=True, slots=True)
 class TestEffort:
-    """How much `rcsc test` tries.
+    """The effort of `rcsc test`.
 
     Attributes:
         examples: Inputs for each matcher, and sequences for each step and cycle.

@@ -48,7 +48,7 @@ MOST_OPEN = 5
 
 
 def with_levels(report: Report, cache: Cache) -> Report:
-    """The report, with what is known of the systems that its tables belong to."""
+    """Add to the report the kept verdicts on the systems that its tables belong to."""
     seen = _Seen(cache)
     tables = tuple(seen.table(table) for table in report.tables)
     diagnostics = {*map(seen.noted, report.diagnostics), *seen.warnings()}
@@ -71,15 +71,15 @@ class _Place:
     default: str
 
     def known(self, assumption: str) -> Known:
-        """What is known of one of the table's assumptions."""
+        """Return the verdict on one of the table's assumptions here."""
         return self.standing.of_obligation(self.level.name, (ASSUMPTION, self.table, assumption))
 
     def rests(self, assumption: str) -> tuple[str, ...]:
-        """What it rests on that is not proved, in words."""
+        """Spell the claims that an assumption rests on and that are not proved."""
         return self.standing.lacking(self.level.name, (ASSUMPTION, self.table, assumption))
 
     def trusts(self, sort: str, name: str) -> tuple[str, ...]:
-        """What a claim of a sort about an assumption or a line of the table trusts, in words."""
+        """Spell the assumptions that a claim of a sort, about an assumption or a line of the table, trusts."""
         return self.standing.trusting(self.level.name, (sort, self.table, name))
 
     @property
@@ -92,10 +92,10 @@ class _Seen:
     """Systems that were looked at for one report.
 
     Attributes:
-        systems: What is to be said of each.
+        systems: The report on each.
         sources: Texts that the warnings point into.
         levels: Those that run a table of the report; by description as shown, and name.
-        idle: Tables of the report whose DEFAULT never runs: with the description.
+        idle: Tables of the report whose DEFAULT never runs, each with the system's description.
     """
 
     def __init__(self, cache: Cache) -> None:
@@ -108,7 +108,7 @@ class _Seen:
         self._roots = functools.cache(_roots)  # a system has many tables
 
     def table(self, table: TableReport) -> TableReport:
-        """The table, with what the nearest system that runs it makes of it."""
+        """Return the table with the verdicts on it in the nearest system that runs it."""
         for system in systems_above(table.file):
             name = _shown(str(system), table.file)
             known_system = self._standing(system)
@@ -122,13 +122,13 @@ class _Seen:
         return table
 
     def _standing(self, system: Path) -> KnownSystem | None:
-        """What is known of a system; None where no level was ever proved, or it is not in order."""
+        """Return the kept verdicts on a system; None where no level was ever proved, or it is not in order."""
         if system not in self._standings:
             self._standings[system] = known(system, cache_of(system.parent, self.cache))
         return self._standings[system]
 
     def _placed(self, table: TableReport, system: str, at: list[_Place]) -> TableReport:
-        """The table, with what is known in all levels of a system that run it."""
+        """Return the table with the verdicts on it in all levels of a system that run it."""
         for place in at:
             self.levels.setdefault((system, place.level.name), (place.standing, place.level))
         states = {name: _worst({place.known(name) for place in at}) for name in _open(table)}
@@ -165,7 +165,7 @@ class _Seen:
     # --- findings ---
 
     def noted(self, diagnostic: Diagnostic) -> Diagnostic:
-        """The finding, with a note where its DEFAULT never runs here, or where its properties are proved."""
+        """Return the finding with a note where its DEFAULT never runs here, or where its properties are proved."""
         if diagnostic.code is Code.PROPERTY_ELSEWHERE:
             return self._elsewhere(diagnostic)
         if diagnostic.code in _BY_MATCHING and diagnostic.witnesses:
@@ -179,7 +179,7 @@ class _Seen:
         return replace(diagnostic, notes=(*diagnostic.notes, note))
 
     def _never_comes(self, diagnostic: Diagnostic) -> Diagnostic:
-        """The finding, with what its file has to say where the levels together are proved to keep such inputs away."""
+        """Return the finding with the help to state an invariant, where the levels together are proved to keep such inputs away."""
         file = os.path.realpath(diagnostic.primary.span.file)
         table = str(diagnostic.witnesses[0].table)
         places_ = [
@@ -203,7 +203,7 @@ class _Seen:
         return replace(diagnostic, notes=(*diagnostic.notes, note), help=(*diagnostic.help, *helps))
 
     def _elsewhere(self, diagnostic: Diagnostic) -> Diagnostic:
-        """The finding, with where its properties are proved, if each is in every level that states it."""
+        """Return the finding with a note where its properties are proved, if each is in every level that states it."""
         file = os.path.realpath(diagnostic.primary.span.file)
         stated = [
             (system, known_system, level.name, (PROPERTY, "", name))
@@ -228,7 +228,7 @@ class _Seen:
         return replace(diagnostic, notes=(*diagnostic.notes, note), help=())
 
     def warnings(self) -> Iterator[Diagnostic]:
-        """What is not proved of the levels that run the tables."""
+        """Yield a warning for each level, of those that run the tables, that is not proved, or relies on a promise that is not."""
         for (system, _), (known_system, level) in self.levels.items():
             if known_system.of_level(level.name) is Known.NOT_PROVED:
                 yield self._not_proved(system, known_system, level)
@@ -255,7 +255,7 @@ class _Seen:
         return Diagnostic(Code.NOT_AGREED, message, label, help=helps, severity=Severity.WARNING)
 
     def _label(self, system: str, level: LevelOutline) -> Label:
-        """The level's name where it is declared."""
+        """Return a label at the level's name where it is declared."""
         file = _shown(level.file, system)
         self.sources.setdefault(file, Source(file, read.text(Path(level.file))))
         return Label(Span(file, level.start, level.end))
@@ -265,13 +265,13 @@ class _Seen:
 
 
 def _beside(tried: Iterable[tuple[Path, Path]], file: str) -> bool:
-    """Whether a file is, or stands with, the root file of a level; `tried` are the two places of each."""
+    """Return whether a file is, or stands with, the root file of a level; `tried` are the two places of each."""
     real = Path(os.path.realpath(file))
     return any(real == beside or real.parent == inside.parent for inside, beside in tried)
 
 
 def _roots(system: Path) -> list[tuple[Path, Path]]:
-    """The two places where the root file of each level may stand; none where the system is not in order."""
+    """Return the two places where the root file of each level may stand; none where the system is not in order."""
     try:
         return [places(system, spec.program) for spec in description(system).levels]
     except BadDescription:
@@ -279,7 +279,7 @@ def _roots(system: Path) -> list[tuple[Path, Path]]:
 
 
 def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:
-    """The levels of a system that run a table."""
+    """Yield the levels of a system that run a table."""
     real = os.path.realpath(table.file)
     for level in known_system.outline.levels:
         for outline in level.tables:
@@ -288,16 +288,16 @@ def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:
 
 
 def _worst(states: Collection[Known]) -> Known:
-    """The worst that several levels know of one thing; unknown where none knows anything."""
+    """Return the worst state among several levels; unknown where none knows anything."""
     order = (Known.NOT_PROVED, Known.UNKNOWN, Known.CONDITIONAL, Known.TRUSTED, Known.PROVED)
     return next((state for state in order if state in states), Known.UNKNOWN)
 
 
 def _open(table: TableReport) -> list[str]:
-    """Assumptions that the proof of the table rests on and has not shown."""
+    """Return the assumptions that the proof of the table rests on and has not shown."""
     return [name for name, was in table.assumptions if was not in (DECLARED_PROVED, NOT_PROVED)]
 
 
 def _shown(path: str, like: str) -> str:
-    """A path as the user would write it who wrote `like`."""
+    """Return a path as the user who wrote `like` would write it."""
     return path if os.path.isabs(like) else os.path.relpath(path)

@@ -84,7 +84,7 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
 
 
 def _beside(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
-    """Run the C of a system beside the Python system; the first difference, and what was run."""
+    """Run the C of a system beside the Python system; return the first difference, and a line on what was run."""
     if generated.clashes:
         return tuple(generated.clashes), ""
     whole = generated.systems[path]
@@ -110,7 +110,7 @@ def _beside(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple
 
 
 def _generated(path: Path, project: Proved) -> Generated:
-    """The executors of a system's programs, and the C of the whole."""
+    """Make the executors of a system's programs, and the C of the whole."""
     generated = Generated(tuple(TARGETS), defensive=False)
     for root, program in project.executable:
         generated.add_program(root, program)
@@ -119,7 +119,7 @@ def _generated(path: Path, project: Proved) -> Generated:
 
 
 def _in_plant(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
-    """Run drawn episodes of a system in its plant; the first that breaks a property, made small and saved, and what was run."""
+    """Run drawn episodes of a system in its plant; return the first that breaks a property, shrunk and saved, and a line on all runs."""
     if generated.clashes:
         return (), ""
     whole = generated.systems[path]
@@ -149,7 +149,7 @@ def _in_plant(path: Path, generated: Generated, effort: TestEffort) -> tuple[tup
 
 
 def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spec: PlantSpec | None) -> str:
-    """What was run of a system's episodes, and what was left out."""
+    """Describe a system's episodes: how many ran, and what was left out."""
     ran = sum(bool(line) for _, _, line in searched.lines)  # a cycle that an input ended ran none
     lines = sum(
         len(its.signs[level.name].tables[table])
@@ -168,7 +168,7 @@ def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spe
 def _falsified(
     path: Path, its: Stand, falsified: tuple[Episode, EpisodeFinding], kinds: Sequence[Kind]
 ) -> Diagnostic:
-    """Make an episode small, save it, and say what it breaks."""
+    """Shrink an episode, save it, and report the property that it breaks."""
     episode, finding = falsified
     name = finding.property
     least = shrink(episode, lambda simpler: found_again(simpler, its, name, kinds) is not None, MOST_TRIES)
@@ -188,7 +188,7 @@ def _falsified(
 
 
 def _alone(system: Linked) -> str:
-    """Why a system cannot be run without what is the user's; empty where it can."""
+    """Return why a system cannot run without the user's own parts; "" where it can."""
     if any(level.questions for level in system.levels):
         return "its levels ask a database"
     if any(procedure.extern for program in system.programs for procedure in program.plan.program.procedures):
@@ -203,7 +203,7 @@ def _try_out(
     effort: TestEffort,
     progress: Callable[[str], None],
 ) -> tuple[tuple[Diagnostic, ...], str]:
-    """Run the suite on one program; what it found, and what it counted."""
+    """Run the suite on one program; return its findings and its counts."""
     asked = SuiteOptions(
         effort.examples,
         effort.cycles,
@@ -218,13 +218,13 @@ def _try_out(
 
 
 def whole_vectors(program: ProvedProgram, settings: Settings) -> VectorSet:
-    """Vectors of the whole C of a program."""
+    """Make vectors of the whole C of a program."""
     plan, options = planned(program), settings.options
     return vector_set(plan, emitted(plan), options, proofs(options).solver, settings.progress)
 
 
 def proofs(options: Options) -> Proofs:
-    """The prover and its solver, as far as the suite needs them."""
+    """Return the prover and its solver, as far as the suite needs them."""
 
     def prover(program: Program, table: Table) -> Opinion:
         verdict = prove_table(program, table, options)

@@ -25,11 +25,11 @@ _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
 
 @dataclass(frozen=True, slots=True)
 class _Checked:
-    """What a check found.
+    """The result of a check.
 
     Attributes:
         roots: The files that were given.
-        looked_at: What stood at every place that was looked at (`digests`).
+        looked_at: The digest of every place that was looked at (`digests`).
     """
 
     roots: tuple[str, ...]
@@ -39,7 +39,7 @@ class _Checked:
 
 
 def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | None:
-    """The report of the same check, if nothing that it depends on has changed."""
+    """Return the report of the same check, if nothing that it depends on has changed."""
     kept = cache.load(_Checked, *_key(paths, options))
     if kept is None or kept.roots != tuple(listed(paths)):
         return None
@@ -65,7 +65,7 @@ def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loa
 
 
 def digests(loaded: Loaded) -> dict[str, str] | None:
-    """What stands at every place that was looked at, those where nothing stands too; None where a file has changed since."""
+    """Return the digest of every place looked at, empty ones too; None where a file has changed since it was read."""
     seen = {name: _seen(name) for name in places(loaded)}
     for name, source in loaded.sources.items():
         if (seen[name][1] or b"").decode("utf-8-sig", "replace") != source.text:
@@ -74,7 +74,7 @@ def digests(loaded: Loaded) -> dict[str, str] | None:
 
 
 def as_before(looked_at: Mapping[str, str]) -> dict[str, bytes] | None:
-    """The contents of the files, if at every place stands what stood there."""
+    """Return the contents of the files, if every place still has its digest."""
     texts: dict[str, bytes] = {}
     for name, digest in looked_at.items():
         now, text = _seen(name)
@@ -86,7 +86,7 @@ def as_before(looked_at: Mapping[str, str]) -> dict[str, bytes] | None:
 
 
 def digest_at(name: str) -> str:
-    """What stands at a place now."""
+    """Return the present digest of a place."""
     return _seen(name)[0]
 
 
@@ -97,7 +97,7 @@ def _key(paths: tuple[str, ...], options: Options) -> tuple[str, ...]:
 
 
 def _seen(name: str) -> tuple[str, bytes | None]:
-    """What stands at a place, and what it holds: a file and where it really is, something that is no file, or nothing.
+    """Return a place's digest and text: of a file and where it really is, of something that is no file, or of nothing.
 
     A `use` goes to the first place where anything stands, be it a folder or a link to nowhere: these are told from an empty place.
     """

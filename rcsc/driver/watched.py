@@ -47,7 +47,7 @@ _NAMES = {
 
 
 def claims_of(path: Path, cache: Cache | None, jobs: int = 1) -> Claims:
-    """Return what is proved of a system; none, and why, where its levels cannot be read."""
+    """Return the proved claims of a system; none, and the reason, where its levels cannot be read."""
     try:
         systems = read_systems(path)[0]
     except CodedError as error:
@@ -96,7 +96,7 @@ def _claims(name: str, ts: TransitionSystem, level: LevelProof, proof: SystemPro
 
 
 def _kind(key: Key) -> str:
-    """The name of a claim's sort; empty of one that is not known here, which is told to be watched by nobody."""
+    """Return the name of a claim's sort; "" for an unknown sort, which is told to be watched by nobody."""
     known = {sort.value: sort.name for sort in Sort} | _NAMES
     return known.get(key[0], "")
 

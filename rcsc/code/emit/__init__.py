@@ -51,9 +51,9 @@ class Target:
     """A language that executors are written in.
 
     Attributes:
-        title: What it is called in messages.
-        emit: The files of a plan, by path below the generated folder.
-        outward: Each name that programs share which are linked together, and what it is.
+        title: Its name in messages.
+        emit: Returns the files of a plan, by path below the generated folder.
+        outward: Yields each name that programs linked together share, with a description.
     """
 
     title: str
@@ -68,7 +68,7 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
 
 
 def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, str]:
-    """The files of a plan in some languages, by path below the generated folder."""
+    """Return the files of a plan in these languages, by path below the generated folder."""
     return {
         path: text for name in TARGETS if name in targets for path, text in TARGETS[name].emit(plan).items()
     }

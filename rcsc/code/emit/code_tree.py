@@ -63,8 +63,8 @@ class Invoke:
     """A call of a function.
 
     Attributes:
-        type: What it gives, where that is asked for.
-        helper: Which of the file's small functions it is, if it is one: what makes the file define it.
+        type: The C type of its result, where that is needed.
+        helper: The name of a helper function, if it is one: the file then defines it.
     """
 
     function: str
@@ -107,7 +107,7 @@ class Items:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """In parentheses, whether they are needed or not; those that are needed stand anyway."""
+    """Code in parentheses, needed or not; needed ones are written without this, too."""
 
     inner: "Code"
 
@@ -136,7 +136,7 @@ class Let:
 
 @dataclass(frozen=True, slots=True)
 class Do:
-    """A call for what it does."""
+    """A call for its effect."""
 
     call: Code
 
@@ -175,7 +175,7 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What only one of the languages has: a line of its words and of code, perhaps a block inside and a line after it."""
+    """Code that only one of the languages has: a line of its words and of code, perhaps a block inside and a line after it."""
 
     head: tuple["str | Code", ...]
     body: "Body" = ()
@@ -195,7 +195,7 @@ Body: TypeAlias = tuple[Stmt, ...]
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function: what is said of it, its head, its body.
+    """A function: its comment, its head, its body.
 
     Attributes:
         inline: Whether C puts it where it is called: for one that a step calls at one place, its call costs more than it.
@@ -208,12 +208,12 @@ class Function:
 
 
 def infix(op: str, *operands: Code) -> Code:
-    """An operation on these; one operand alone is what it is."""
+    """Return an operation on these operands; a single operand is returned as it is."""
     return Infix(op, operands) if len(operands) > 1 else operands[0]
 
 
 def type_bounds(name: str) -> tuple[int, int]:
-    """Least and greatest value of an integer type of C, or of `bool`."""
+    """Return the least and the greatest value of an integer type of C, or of `bool`."""
     if name == "bool":
         return 0, 1
     bits = int(name.strip("uint_"))
@@ -221,23 +221,23 @@ def type_bounds(name: str) -> tuple[int, int]:
 
 
 def times(count: int) -> str:
-    """How often, in words."""
+    """Spell how often: "once", "3 times"."""
     return "once" if count == 1 else f"{count} times"
 
 
 def repeated(begin: Set, goes: Code, step: Set, *body: Stmt, bound: str, declared: str = "") -> Frame:
-    """C's `for`, with a comment that says how often it runs; it declares its variable, where a type is given."""
+    """Return a C `for` with a comment that bounds its runs; it declares its variable, where a type is given."""
     first, then = (infix("=", assignment.place, assignment.value) for assignment in (begin, step))
     return Frame((f"for ({declared}", first, "; ", goes, "; ", then, f") {{ /* {bound} */"), body, "}")
 
 
 def when(condition: Code, *body: Stmt) -> Branch:
-    """What is done only where the condition holds."""
+    """Return statements that run only where the condition holds."""
     return Branch(((condition, body),))
 
 
 def read(node: object) -> Iterator[Code]:
-    """Every expression in a tree, but for variables that are only set."""
+    """Yield every expression in a tree, but for variables that are only set."""
     waiting = [node]
     while waiting:
         node = waiting.pop()
@@ -263,11 +263,11 @@ class Language(ABC):
     """Spells code.
 
     Attributes:
-        state: What a member of the state begins with.
+        state: The prefix of a member of the state.
         levels: How closely an operator binds, a prefix under its text and `x`; 0 for those not named.
         chained: Operators whose first operand needs no parentheses where it binds as closely.
-        end: What a plain statement ends with.
-        heads: The lines of `if`, of `else if`, of `else`, and what closes them all.
+        end: The end of a plain statement.
+        heads: The lines of `if`, of `else if`, of `else`, and the line that closes them all.
     """
 
     state: str
@@ -277,7 +277,7 @@ class Language(ABC):
     heads: tuple[str, str, str, str]
 
     def code(self, code: Code) -> str:
-        """An expression."""
+        """Spell an expression."""
         match code:
             case Name(text=text):
                 return text
@@ -303,7 +303,7 @@ class Language(ABC):
                 assert_never(code)
 
     def operand(self, code: Code, level: int) -> str:
-        """An operand of an operator of this level, in parentheses where it binds no closer."""
+        """Spell an operand of an operator of this level, in parentheses unless it binds closer."""
         match code:
             case Infix(op=op):
                 loose = self.levels.get(op, 0) <= level
@@ -314,7 +314,7 @@ class Language(ABC):
         return f"({self.code(code)})" if loose else self.code(code)
 
     def lines(self, body: Body, indent: int = 1) -> Iterator[str]:
-        """Statements, a line each."""
+        """Spell statements, a line each."""
         pad = "    " * indent
         for stmt in body:
             match stmt:
@@ -345,15 +345,15 @@ class Language(ABC):
 
     @abstractmethod
     def constant(self, constant: Constant) -> str:
-        """A number or a truth."""
+        """Spell a number or a truth."""
 
     @abstractmethod
     def own(self, code: Cast | Choice | Items) -> str:
-        """An expression that each language spells in its own way."""
+        """Spell an expression for which each language has its own form."""
 
     @abstractmethod
     def framed(self, stmt: Let | Loop) -> Body:
-        """A statement that each language spells in its own way, by simpler ones."""
+        """Return a statement for which each language has its own form, made of simpler ones."""
 
 
 class C(Language):
@@ -364,7 +364,7 @@ class C(Language):
     heads = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
 
     def constant(self, constant: Constant) -> str:
-        """By its type; the least of `int64_t` has no spelling of its own."""
+        """Spell a constant by its type; the least `int64_t` has no literal of its own."""
         value = constant.value
         match constant.type:
             case "bool":
@@ -384,7 +384,7 @@ class C(Language):
                 return f"{value:d}{'u' if constant.type.startswith('u') else ''}"
 
     def own(self, code: Cast | Choice | Items) -> str:
-        """As ISO C99, 6.5.4, 6.5.15 and 6.7.8."""
+        """Spell the expression as in ISO C99, 6.5.4, 6.5.15 and 6.7.8."""
         match code:
             case Cast(type=name, operand=operand):
                 return f"({name}){self.operand(operand, -1 if isinstance(operand, Prefix) else 1)}"
@@ -394,7 +394,7 @@ class C(Language):
                 return f"{{ {', '.join(map(self.code, items))} }}"
 
     def framed(self, stmt: Let | Loop) -> Body:
-        """Declarations; a loop to the last value of its type ends without counting past it."""
+        """Return declarations and loops as C has them; a loop to the last value of its type ends without counting past it."""
         match stmt:
             case Let(type=kind, name=name, value=value):
                 return (Line(f"{kind} {name}{'' if value is None else f' = {self.code(value)}'};"),)
@@ -425,12 +425,12 @@ class Python(Language):
     heads = ("if {}:", "elif {}:", "else:", "")
 
     def constant(self, constant: Constant) -> str:
-        """A number has no type of C."""
+        """Spell a constant; its C type is ignored but for its kind."""
         kind = {"bool": bool, "double": float, "float": float}.get(constant.type, int)
         return repr(kind(constant.value))
 
     def own(self, code: Cast | Choice | Items) -> str:
-        """A conversion, a conditional expression, a tuple."""
+        """Spell a conversion, a conditional expression or a tuple."""
         match code:
             case Cast(type=name, operand=operand):
                 return f"{name}({self.code(operand)})"
@@ -440,11 +440,11 @@ class Python(Language):
                 return f"({', '.join(map(self.code, items))},)"
 
     def lines(self, body: Body, indent: int = 1) -> Iterator[str]:
-        """Statements, a line each; `pass` for nothing."""
+        """Spell statements, a line each; `pass` for an empty body."""
         yield from list(super().lines(body, indent)) or ["    " * indent + "pass"]
 
     def framed(self, stmt: Let | Loop) -> Body:
-        """Nothing is declared."""
+        """Return assignments and loops as Python has them; nothing is declared."""
         match stmt:
             case Let(name=name, value=value):
                 return (Set(Name(name), value),) if value is not None else ()

@@ -25,11 +25,11 @@ from typing import TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """Where nothing more is asked.
+    """An end of the tree, where nothing more is asked.
 
     Attributes:
         lines: The lines that are left, a bit each.
-        exact: Whether every one of them holds for all that comes here.
+        exact: Whether every one of them holds for all inputs that come here.
     """
 
     lines: int
@@ -57,7 +57,7 @@ DEEPEST = 60
 
 
 class _TooManyError(Exception):
-    """There would be more ends than are wanted, or more questions after one another."""
+    """The tree would have too many ends, or be too deep."""
 
 
 def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) -> Decision | None:
@@ -77,7 +77,7 @@ def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) ->
 
 
 def cuts(decided: Decision) -> Iterator[Cut]:
-    """Give the questions, each after those that are asked after it."""
+    """Yield the questions, each after those that are asked after it."""
     if isinstance(decided, Cut):
         yield from cuts(decided.below)
         yield from cuts(decided.above)
@@ -85,7 +85,7 @@ def cuts(decided: Decision) -> Iterator[Cut]:
 
 
 def ends(decided: Decision) -> Iterator[End]:
-    """Give the ends, those below a cut before those above."""
+    """Yield the ends, those below a cut before those above."""
     if isinstance(decided, End):
         yield decided
     else:
@@ -94,7 +94,7 @@ def ends(decided: Decision) -> Iterator[End]:
 
 
 def depth(decided: Decision) -> int:
-    """Return how many questions are asked at most."""
+    """Return the greatest number of questions asked."""
     return 0 if isinstance(decided, End) else 1 + max(depth(decided.below), depth(decided.above))
 
 
@@ -105,7 +105,7 @@ class _Grower:
     few: int
 
     def grown(self, lines: int, spans: Spans, deep: int) -> Decision:
-        """The tree for the lines that may match within these classes."""
+        """Return the tree for the lines that may match within these classes."""
         for every, (low, high) in zip(self.probes, spans, strict=True):
             lines &= reduce(or_, every[low:high], 0)  # one that matches nowhere here is not waited for
         cut = None if lines.bit_count() <= self.few else self._best(lines, spans)
@@ -125,14 +125,14 @@ class _Grower:
         return Cut(at, first, self.grown(below, under, deep - 1), self.grown(above, over, deep - 1))
 
     def _open(self, lines: int, spans: Spans) -> Iterator[tuple[int, int, list[int]]]:
-        """Each probe that still tells lines apart, with its first class and the lines left in each."""
+        """Yield each probe that still tells lines apart, with its first class and the lines left in each class."""
         for at, (every, (low, high)) in enumerate(zip(self.probes, spans, strict=True)):
             masks = [mask & lines for mask in every[low:high]]
             if any(mask != lines for mask in masks):
                 yield at, low, masks
 
     def _best(self, lines: int, spans: Spans) -> tuple[int, int, int, int] | None:
-        """The probe and the class of the best cut, and the lines left below and above; None where nothing is told apart."""
+        """Return the probe and class of the best cut, and the lines left below and above; None where no probe tells lines apart."""
         best: tuple[tuple[int, int, int], tuple[int, int, int, int]] | None = None
         for at, low, masks in self._open(lines, spans):
             below = list(accumulate(masks, or_))

@@ -20,7 +20,7 @@ _SYMBOLS = re.compile(r'\{\s*"program": "([^"]*)"')
 
 
 def write(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
-    """Write the files under `folder`; return what cannot be written or would overwrite something else: then none is.
+    """Write the files under `folder`; return the errors. Where files of others would be overwritten, none is written.
 
     Unchanged files are left alone.
     """
@@ -40,7 +40,7 @@ def write(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
 
 
 def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
-    """A diagnostic for each file under `folder` that is missing or differs."""
+    """Return a diagnostic for each file under `folder` that is missing or differs."""
     diagnostics = []
     for name, text in sorted(files.items()):
         path = Path(folder) / name
@@ -56,7 +56,7 @@ def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
 
 
 def _others(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
-    """A diagnostic for each file that stands in the way and is of another program, or of none."""
+    """Yield a diagnostic for each file that would be overwritten and is of another program, or of none."""
     for name, text in sorted(files.items()):
         path = folder / name
         there = _begins(path)
@@ -71,7 +71,7 @@ def _others(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
 
 
 def _program(text: str) -> str:
-    """The name of the program that a generated file says it is of; empty where it says none."""
+    """Return the name of the program that a generated file names; "" where it names none."""
     if match := _MARK.match(text):
         return PurePath(match[1].removesuffix(" */")).stem
     symbols = _SYMBOLS.match(text)
@@ -79,7 +79,7 @@ def _program(text: str) -> str:
 
 
 def _begins(path: Path) -> str:
-    """The first characters of a file; empty where none can be read, which writing will say."""
+    """Return the first characters of a file; "" where it cannot be read, which writing will report."""
     try:
         return beginning(path, _HEAD).decode("utf-8", "replace")
     except (OSError, Malformed):
@@ -87,7 +87,7 @@ def _begins(path: Path) -> str:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what a file holds; None where that is nothing which could have been generated.
+    """Return a file's content; None where it cannot have been generated.
 
     Raises:
         OSError: It cannot be read.

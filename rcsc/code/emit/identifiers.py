@@ -51,26 +51,26 @@ FEW_FAILED_BITS = 32
 
 
 def c_word(name: str) -> str:
-    """`name`, short, where C, C++ and their libraries leave it free; a word in capitals may be a macro."""
+    """Return `name`, cut if long, with `_` after it where C, C++ or a library uses it; a word in capitals may be a macro."""
     name = short(name)
     capitals = len(name) > 1 and name.isupper()
     return f"{name}_" if capitals or name in C_WORDS or name.startswith("_") else name
 
 
 def parameter_word(name: str) -> str:
-    """A leaf or a parameter as the parameter of a C prototype."""
+    """Return a leaf's or a parameter's name as the parameter of a C prototype."""
     return c_word(re.sub(r"\W+", "_", name).strip("_") or "p")
 
 
 def python_word(name: str) -> str:
-    """`name` where Python leaves it free."""
+    """Return `name`, changed where Python reserves it."""
     if name.startswith("_"):
         name = f"x{name}"
     return f"{name}_" if name in PYTHON_WORDS else name
 
 
 def comment(text: str) -> str:
-    """A text that can stand in a comment of either language and end neither; a very long one is cut.
+    """Clean a text so that it can stand in a comment of either language and end neither; a very long one is cut.
 
     Nothing in it means anything to a compiler, a build tool or an analyser: no end or begin of a comment, no continued line, no
     trigraph (ISO C99, 5.2.1.1), no declared encoding (PEP 263), no expansion, no suppression.
@@ -93,21 +93,21 @@ class Names:
         attributes: Python attribute of each leaf.
         paths: Path of each leaf in the C struct, member by member and index by index.
         roots: Member of the C struct for each declared variable.
-        members: For each record, what its struct calls each field.
+        members: For each record, the name of each field in its struct.
         tables, levels, procedures: The stem of each.
         holding: The C function of each assumption that is checked.
         units: Prefix of the types of each file that declares some: programs that use the file share them.
         types: C type of each record and enumeration.
         constants: For each enumeration, the C constant of each member.
         classes: Python class of each enumeration.
-        class_members: For each enumeration, what its Python class calls each member.
+        class_members: For each enumeration, the name of each member in its Python class.
         failed: Words of the trace for the monitored assumptions that failed.
         lines: For each table, the C constant of each line; `assumptions`, `faults`, `leaves` and `invariants` likewise.
         places: The C constant of each table that others follow in a cycle.
-        checks: The C constants that `check` gives of a state that may be gone on from, and of one that other tables made.
+        checks: The C constants that `check` returns for a state to go on from, and for one that other tables made.
         digest: The C macro of the number that tells which tables a state is of.
         layout: The C type that is there where the state is laid out as was meant.
-        c: What stands at file scope in C; `module` in the Python module.
+        c: All names at file scope in C; `module`, those of the Python module.
     """
 
     file: str
@@ -140,20 +140,20 @@ class Names:
 
 
 def failed_type(monitored: int) -> str:
-    """Give the type of those members: one machine word of a small processor where that is enough."""
+    """Return the type of those members: one machine word of a small processor where that is enough."""
     return "uint32_t" if monitored <= FEW_FAILED_BITS else "uint64_t"
 
 
 def failed_words(monitored: int) -> tuple[str, ...]:
-    """Members of the trace that hold one bit for each monitored assumption, 64 in each; there is at least one."""
+    """Return the members of the trace with one bit for each monitored assumption, 64 in each; there is at least one."""
     more = range(2, (monitored + FAILED_BITS - 1) // FAILED_BITS + 1)
     return ("assumptions_failed", *(f"assumptions_failed_{number}" for number in more))
 
 
 def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}), prefix: str = "") -> Names:
-    """All names, made unique in declared order.
+    """Make all names unique, in declared order.
 
-    Those of types come first: they hang on the file that declares them alone, and not on the program that uses it.
+    Those of types come first: they depend only on the file that declares them, and not on the program that uses it.
 
     Args:
         program: The program.
@@ -183,18 +183,18 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}),
 
 
 def names_in(plan: Plan) -> Names:
-    """All names of what is emitted of a plan."""
+    """Return all names used in the code of a plan."""
     return names_of(plan.program, plan.places, plan.prefix)
 
 
 def _program_words(program: Program, prefix: str) -> tuple[str, str]:
-    """The program's own word, and the one that its C names and files bear."""
+    """Return the program's own word, and the one for its C names and files."""
     own = plain_word(program.name)
     return own, file_word(own, prefix)
 
 
 def plain_word(name: str) -> str:
-    """A name of a file or of a system as a word, short."""
+    """Turn the name of a file or of a system into a word, cut if long."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII) or "program"
     return short(word if word[0].isalpha() else f"p{word}")
 
@@ -204,7 +204,7 @@ LONGEST_PREFIX = 18
 
 
 def file_word(word: str, prefix: str = "") -> str:
-    """A word that C names and files may bear: one that no library or tool keeps."""
+    """Return a word for C names and files: one that no library or tool reserves."""
     word = prefix + abbreviated(word, LONGEST_PREFIX - len(prefix))
     kept = word.lower() in _FILES | C_WORDS
     composed = any(f"{word}_{end}" in reserved.C_COMPOSED for end in OWN)
@@ -212,12 +212,12 @@ def file_word(word: str, prefix: str = "") -> str:
 
 
 def types_header(unit: str) -> str:
-    """The name of the header that declares the types of a file."""
+    """Return the name of the header that declares the types of a file."""
     return f"{unit}_types.h"
 
 
 def _units(program: Program, p: str, places: Mapping[str, str], prefix: str) -> dict[str, str]:
-    """The word of each file that declares a type: the program's for its own, else one made of the file's place.
+    """Return the word of each file that declares a type: the program's for its own, else one made from the file's place.
 
     Files whose types need each other have one word, that of the first: one header declares them.
     """
@@ -237,7 +237,7 @@ def _units(program: Program, p: str, places: Mapping[str, str], prefix: str) -> 
 
 
 def _unit(program: Program, own: tuple[str, str], file: str, places: Mapping[str, str]) -> str:
-    """The word of one file: `emove/common` is `emove_common`, `gripper/gripper` is `gripper`; `own` is the program's, and the prefix."""
+    """Return the word of one file: `emove/common` is `emove_common`, `gripper/gripper` is `gripper`; `own` is program word and prefix."""
     p, prefix = own
     if file in {"", program.file}:
         return p
@@ -247,7 +247,7 @@ def _unit(program: Program, own: tuple[str, str], file: str, places: Mapping[str
 
 
 def _named(record: Record) -> Iterator[str]:
-    """Names of the types that a record's own fields have."""
+    """Yield the names of the types that a record's own fields have."""
     for part in record.fields:
         kind = part.type
         while isinstance(kind, Array):
@@ -257,23 +257,23 @@ def _named(record: Record) -> Iterator[str]:
 
 
 def _types(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, str]:
-    """`UNIT_NAME_t` for each type."""
+    """Name each type `UNIT_NAME_t`."""
     wanted = [f"{units[kind.file]}_{_stem(kind.name)}_t" for kind in program.types]
     return dict(zip((kind.name for kind in program.types), scope.distinct(wanted), strict=True))
 
 
 def capitals(p: str) -> str:
-    """A program's word in capitals; as it is where it has some, which may be all that tells it from another's."""
+    """Return a program's word in capitals; unchanged where it has some, as only they may tell it from another's."""
     return p.upper() if p.islower() else p
 
 
 def guard(p: str) -> str:
-    """The include guard of a program's header."""
+    """Return the include guard of a program's header."""
     return f"{capitals(p)}_H"
 
 
 def types_guard(unit: str) -> str:
-    """The include guard of a header of types."""
+    """Return the include guard of a header of types."""
     return f"{capitals(unit)}_TYPES_H"
 
 
@@ -292,7 +292,7 @@ class _Stems:
     module: NameScope
 
     def of(self, names: Iterable[str], in_c: tuple[str, ...], in_python: tuple[str, ...]) -> dict[str, str]:
-        """A stem for each name.
+        """Return a stem for each name.
 
         Args:
             names: Of one kind, in declared order.
@@ -308,7 +308,7 @@ class _Stems:
 
 
 def _stem(name: str) -> str:
-    """A stem stands between other words: only what no word may be is changed."""
+    """Return a name as a stem, which stands between other words: only names that no word may have are changed."""
     name = short(name)
     return f"{name}_" if name in reserved.C_KEYWORDS or name.startswith("_") else name
 
@@ -320,7 +320,7 @@ def _attributes(program: Program, failed: tuple[str, ...]) -> dict[str, str]:
 
 
 def _unlike(word: str, scope: NameScope) -> str:
-    """The word, told apart from what the scope reserves as a keyword would be."""
+    """Return the word, with `_` after it where the scope reserves it."""
     return f"{word}_" if word in scope.names else word
 
 
@@ -329,7 +329,7 @@ def _flat(name: str) -> str:
 
 
 def constant_word(p: str, *parts: str) -> str:
-    """`PROGRAM_ENUM_MEMBER`, with `_` after it where macros of a library begin like that."""
+    """Return `PROGRAM_ENUM_MEMBER`, with `_` after it where macros of a library begin like that."""
     tail = "_" if p.upper().split("_")[0] in reserved.C_FAMILIES else ""
     return f"{capitals(p)}_{'_'.join(map(short, parts)).upper()}{tail}"
 
@@ -354,7 +354,7 @@ def _positions(
     tuple[str, ...],
     dict[str, str],
 ]:
-    """Constants for what a cycle tells by its position.
+    """Name the constants of positions in the trace.
 
     Lines of each table, assumptions that are checked, faults, variables, invariants, tables that others follow.
     """
@@ -387,7 +387,7 @@ def _positions(
 
 
 def _state(p: str, scope: NameScope) -> tuple[tuple[str, str], str, str]:
-    """What `check` gives beside positions, and what tells one program's state from another's."""
+    """Name the results of `check` besides positions, and the constants that tell one program's state from another's."""
     checks = (scope.fresh(constant_word(p, "check", word)) for word in ("ok", "foreign"))
     return (
         (next(checks), next(checks)),
@@ -407,7 +407,7 @@ def _class_members(program: Program) -> dict[str, tuple[str, ...]]:
 def _paths(
     program: Program, members: dict[str, dict[str, str]], failed: tuple[str, ...]
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
-    """What the struct calls each declared variable, and the place of each leaf; the pending leaf of `x` is `x_next`."""
+    """Return the struct member of each declared variable, and the path of each leaf; the pending leaf of `x` is `x_next`."""
     taken = c_scope({DIGEST, *TRACE, *failed})
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}

@@ -61,20 +61,20 @@ MOST_CODES = 1 << 18
 
 
 def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False, prefix: str = "") -> Plan:
-    """The plan of a proved program; there is no other way to one that is not marked.
+    """Make the plan of a proved program; only such a plan is emitted without a mark.
 
     Args:
         proved: The program that was proved.
         root: The project's folder: files are named as seen from there, so that the same project gives the
             same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
         defensive: Whether the executors check their state at the beginning of every cycle.
-        prefix: What names of files, and in C, begin with.
+        prefix: The prefix of file names and C names.
     """
     return replace(_plan(proved.program, root, proved=True), defensive=defensive, prefix=prefix)
 
 
 def lower_by_force(program: Program, root: str = "") -> Plan:
-    """The plan of a program that is not proved, to run a finding: what is emitted of it is marked, and no cell runs it."""
+    """Make the plan of a program that is not proved, to run a finding: its code is marked, and no cell runs it."""
     return _plan(program, root, proved=False)
 
 
@@ -91,12 +91,12 @@ def _plan(program: Program, root: str, *, proved: bool) -> Plan:
 
 
 def _seen(file: str, root: str) -> str:
-    """The file's name as seen from the folder `root`, with `/`."""
+    """Return the file's name as seen from the folder `root`, with `/`."""
     return (os.path.relpath(file, root) if root else file).replace("\\", "/")
 
 
 def _place(file: str, root: str) -> str:
-    """Where a file stands in the project, without its ending; its name alone where it stands elsewhere."""
+    """Return a file's place in the project, without its ending; its name alone where it stands elsewhere."""
     seen = _seen(file, root).removesuffix(".rcs")
     return seen if root and not seen.startswith(("../", "/")) else seen.rpartition("/")[2]
 
@@ -129,7 +129,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
 
 
 def _conditions(table: Table, line: Line) -> tuple[str, ...]:
-    """What a line states, heading by heading; its condition alone under `when`."""
+    """Spell the conditions of a line, heading by heading; a condition under `when` alone."""
     stated = zip(table.columns, line.tests, strict=True)
     conditions = tuple(
         _stated(column, test) for column, test in stated if test is not None and column.written
@@ -139,7 +139,7 @@ def _conditions(table: Table, line: Line) -> tuple[str, ...]:
 
 
 def _stated(column: Column, test: Test) -> str:
-    """A condition in words: the heading and the cell; the cell alone under `when`."""
+    """Spell a condition: the heading and the cell; the cell alone under `when`."""
     return test.text if column.subject is None else f"{column.heading} {test.text}"
 
 
@@ -166,7 +166,7 @@ def _matcher(program: Program, table: Table) -> Matcher:
 
 
 def _of_windows(matcher: Callable[..., Matcher], probes: list[Probe], everyone: int) -> Matcher | None:
-    """The matcher by windows, where few enough cuts part the lines that it costs less than joining all words of masks."""
+    """Return the matcher by windows, where few cuts part the lines so that it costs less than joining whole masks; else None."""
     leaves = tuple(probe for probe in probes if not isinstance(probe.index, Truth))
     words = -(-everyone.bit_length() // WORD)
     groups = grouped(probes, MOST_GROUPED)
@@ -187,7 +187,7 @@ def _of_windows(matcher: Callable[..., Matcher], probes: list[Probe], everyone: 
 
 
 def _entries(groups: tuple[Group, ...]) -> int:
-    """How many masks the tables of the groups have."""
+    """Count the masks in the tables of the groups."""
     return sum(prod(len(probe.masks) for probe in group) for group in groups)
 
 
@@ -198,7 +198,7 @@ def _declared(
 
 
 def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:
-    """The masks of one leaf: for each class the lines whose boxes contain it."""
+    """Return the masks of one leaf: for each class the lines whose boxes contain it."""
     low, high = key_bounds(variable.type)
     index: Index
     if not isinstance(variable.type, Real) and (
@@ -232,6 +232,6 @@ def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int
 
 
 def _test_probe(truth: Truth, lines: list[int], everyone: int) -> Probe:
-    """The masks of one test: without it, the lines that do not state it."""
+    """Return the masks of one test: the lines that do not state it, and all lines."""
     stating = sum(1 << at for at in set(lines))
     return Probe(truth, (everyone & ~stating, everyone))

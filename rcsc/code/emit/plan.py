@@ -37,7 +37,7 @@ class Cuts:
 
     @property
     def count(self) -> int:
-        """How many classes there are."""
+        """The number of classes."""
         return len(self.cuts) + 1
 
 
@@ -52,7 +52,7 @@ class Coded:
 
     @property
     def count(self) -> int:
-        """How many classes there are."""
+        """The number of classes."""
         return max(self.classes) + 1
 
 
@@ -69,7 +69,7 @@ Index: TypeAlias = Direct | Coded | Cuts | Truth
 
 
 def first_value(index: Direct | Coded | Cuts, number: int) -> int | float:
-    """The least value of a leaf whose class is at least `number`, which is not 0; of no real, its key."""
+    """Return the least value of a leaf whose class is at least `number`, which is not 0; the least key, where it is no real."""
     match index:
         case Cuts(cuts=cuts):
             return cuts[number - 1]
@@ -81,7 +81,7 @@ def first_value(index: Direct | Coded | Cuts, number: int) -> int | float:
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """A class and what it leaves.
+    """A class, and the lines that it leaves.
 
     Attributes:
         masks: For each class a mask: bit k is set where line k does not exclude it.
@@ -97,11 +97,11 @@ Group: TypeAlias = tuple[Probe, ...]
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """What parts a table of many lines into windows of at most one word; masks tell which line of a window it is.
+    """Cuts of a table of many lines into windows of at most one word; masks tell which line of a window it is.
 
     Attributes:
-        probes: What `decided` asks for.
-        decided: Where an input belongs: each end is a window, which has every line that may match there.
+        probes: The leaves that `decided` asks about.
+        decided: The window of an input: each end is a window, which has every line that may match there.
         apart: Whether the masks' words are kept once each, and the tables keep their places.
     """
 
@@ -142,14 +142,14 @@ class Matcher:
 
 
 def members(mask: int) -> Iterator[int]:
-    """The lines of a mask, in order."""
+    """Yield the lines of a mask, in order."""
     while mask:
         yield (mask & -mask).bit_length() - 1
         mask &= mask - 1
 
 
 def joined(group: Group) -> tuple[int, ...]:
-    """The masks of a group: one for each combination of classes."""
+    """Return the masks of a group: one for each combination of classes."""
     masks = group[0].masks
     for probe in group[1:]:
         masks = tuple(mask & two for mask in masks for two in probe.masks)
@@ -157,7 +157,7 @@ def joined(group: Group) -> tuple[int, ...]:
 
 
 def grouped(probes: Iterable[Probe], most: int, *, shifted: bool = False) -> tuple[Group, ...]:
-    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables.
+    """Join probes while their classes together are at most `most`: fewer masks to load, larger tables.
 
     Args:
         probes: One for each leaf or test.
@@ -178,17 +178,17 @@ def grouped(probes: Iterable[Probe], most: int, *, shifted: bool = False) -> tup
 
 
 def table_position(program: Program, table: str) -> int:
-    """The position of a table, by which a fault names one before the last of a cycle."""
+    """Return the position of a table, by which a fault names one before the last of a cycle."""
     return [candidate.name for candidate in program.tables].index(TableName(table))
 
 
 @dataclass(frozen=True, slots=True)
 class PlanLine:
-    """A line and what it does, for DEFAULT too.
+    """A line and its actions, for DEFAULT too.
 
     Attributes:
         source: The file, and the line's name; its table's, too, where the file has several.
-        conditions: What it states, heading by heading.
+        conditions: Its conditions, heading by heading.
         requirements: Names of those that it answers.
     """
 
@@ -200,23 +200,23 @@ class PlanLine:
 
     @property
     def place(self) -> str:
-        """Where it stands, and what for: `task/release.rcs line 4 [SR-12]`."""
+        """Its file, its name and its requirements: `task/release.rcs line 4 [SR-12]`."""
         return f"{self.source}{answering(self.requirements)}"
 
     @property
     def told(self) -> str:
-        """Where it stands, what for, and when it runs, in words."""
+        """Its place and its conditions, in words."""
         return f"{self.place}: {'; '.join(self.conditions)}" if self.conditions else self.place
 
 
 def answering(requirements: Iterable[str]) -> str:
-    """Names of requirements, in brackets after a blank; empty for none."""
+    """Spell names of requirements, in brackets after a blank; "" for none."""
     names = ", ".join(requirements)
     return f" [{names}]" if names else ""
 
 
 def stated(procedure: Procedure, files: Mapping[str, str]) -> str:
-    """Where a procedure stands, what for, and what it is, in words; the protocol's own stand in no file.
+    """Describe a procedure: its file, name, requirements and doc; the protocol's own have no file.
 
     Args:
         procedure: The procedure.
@@ -245,7 +245,7 @@ class PlanTable:
 
     @property
     def where(self) -> str:
-        """What must hold where the table is matched by itself, in words; empty for nothing."""
+        """The assumptions that must hold where the table is matched by itself, in words; empty for none."""
         names = " and ".join(self.table.stops)
         return f" where {names} {'holds' if len(self.stops) == 1 else 'hold'}" if names else ""
 
@@ -259,7 +259,7 @@ class Plan:
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
         places: For each file that declares a type, its place in the project, relative, with `/` and without its ending.
         files: For each file that declares a procedure or an assumption, its name, relative, with `/`.
-        prefix: What names of files, and in C, begin with.
+        prefix: The prefix of file names and C names.
         proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
         defensive: Whether every cycle begins with a check of the state.
     """
@@ -276,7 +276,7 @@ class Plan:
 
     @property
     def checked(self) -> tuple[str, ...]:
-        """What each assumption that is checked does where it fails, in words: `seen: ends the cycle in tally; told in count`."""
+        """The effect of each checked assumption where it fails, in words: `seen: ends the cycle in tally; told in count`."""
         return tuple(self._checked(place, at) for place, at in enumerate(self.monitored))
 
     def _checked(self, place: int, at: int) -> str:
@@ -290,5 +290,5 @@ class Plan:
 
     @property
     def mark(self) -> str:
-        """The mark of what is not proved; empty for what is."""
+        """The mark of code that is not proved; empty for proved code."""
         return "" if self.proved else UNPROVED

@@ -80,7 +80,7 @@ MOST_GROUPED = 512
 
 
 def emit_python(plan: Plan) -> dict[str, str]:
-    """The Python module of the plan, by path below the generated folder."""
+    """Return the Python module of the plan, by path below the generated folder."""
     maker = _Maker(plan)
     return {f"python/{maker.names.program}.py": render("module.py.jinja", maker.view())}
 
@@ -100,7 +100,7 @@ class _Maker:
         }
 
     def view(self) -> dict[str, object]:
-        """What the template lays out."""
+        """Return the values that the template lays out."""
         functions = [self._procedure(p) for p in self.program.procedures]
         functions += [self._check(), self._admit(), self._settle(), *self._safe(), *self._begin()]
         for table in self.plan.tables:
@@ -134,7 +134,7 @@ class _Maker:
         yield from dict.fromkeys(extern.partition(":")[0] for extern in externs)
 
     def _constant(self, wanted: str, rows: tuple[str, ...]) -> Name:
-        """A tuple of the module; its name."""
+        """Add a tuple to the module; return its name."""
         name = self.names.module.fresh(wanted)
         self.constants.append((name, rows))
         return Name(name)
@@ -171,12 +171,12 @@ class _Maker:
     # --- admission ---
 
     def _trace(self, *more: Stmt) -> Body:
-        """The trace of a cycle that has run no line."""
+        """Return statements that set the trace of a cycle that has run no line."""
         failed = (Set(Place((word,)), Constant(0)) for word in self.names.failed)
         return (Set(LINE, Constant(-1)), *more, *failed)
 
     def _admit(self) -> Function:
-        """Looks at every input before it changes any."""
+        """Return the function that admits inputs: it looks at every one before it changes any."""
         inputs = [(at, v) for at, v in enumerate(self.program.variables) if v.kind is model.Kind.INPUT]
         values = [Name(f"i{number}") for number, _ in enumerate(inputs)]
         body: list[Stmt] = []
@@ -190,7 +190,7 @@ class _Maker:
         )
 
     def _check(self) -> Function:
-        """As in C."""
+        """Return the function that checks the state, as in C."""
         body = [when(infix("!=", Place((DIGEST,)), Name("DIGEST")), Leave(Name("FOREIGN")))]
         for at, variable in enumerate(self.program.variables):
             if variable.kind is not model.Kind.INPUT or isinstance(variable.type, Bool):
@@ -243,7 +243,7 @@ class _Maker:
             yield _on_state("After a fault: outputs that have a safe value show it.", "_safe", *shown)
 
     def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
-        """The frame of every step and cycle."""
+        """Return the frame of every step and cycle."""
         begin = Invoke("_begin" if self.plan.defensive else "_admit", (STATE,))
         shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, _run("_safe")),) if shown else ()
@@ -287,7 +287,7 @@ class _Maker:
         yield from self._joined(matcher, probes, upper)
 
     def _decided(self, decided: Decision, matcher: Matcher, probes: Sequence[Probe]) -> Iterator[Stmt]:
-        """Ifs for the cuts; each end tells how many of the lines hold there."""
+        """Yield an `if` for each cut; each end returns its one line, or tells that none or several hold there."""
         match decided:
             case End(lines=0):
                 yield Leave(Constant(matcher.lines if matcher.default else -1))
@@ -298,7 +298,7 @@ class _Maker:
                 yield Branch(((self._reaches(probes[decided.probe].index, decided.first), one),), other)
 
     def _reaches(self, index: Index, number: int) -> Code:
-        """Whether the class is at least `number`."""
+        """Return the condition that the class is at least `number`."""
         match index:
             case Truth(condition=condition):
                 return self.text.expr(condition)
@@ -312,7 +312,7 @@ class _Maker:
                 assert_never(index)
 
     def _joined(self, matcher: Matcher, probes: Sequence[Probe], upper: str) -> Iterator[Stmt]:
-        """The masks of all leaves, joined."""
+        """Yield code that joins the masks of all leaves and returns the line."""
         tail = f"{matcher.lines}, {matcher.default}"
         names = {
             id(probe): self._constant(f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks))
@@ -339,7 +339,7 @@ class _Maker:
         yield Leave(Name(f"m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"))
 
     def _index(self, group: Group, name: str) -> Code:
-        """The place of the classes together: a sum, each class times how many places it moves."""
+        """Return the joint index of the classes: a sum, each class times its stride."""
         stride = prod(len(probe.masks) for probe in group)
         index: Code | None = None
         for number, probe in enumerate(group):
@@ -349,7 +349,7 @@ class _Maker:
         return index
 
     def _class(self, index: Index, name: str, stride: int, before: Code | None) -> Code:
-        """The class of one leaf times the stride, added to what is before it."""
+        """Return the class of one leaf times the stride, added to the code before it."""
         match index:
             case Direct(leaf=leaf, low=low) if stride == 1:
                 return _less(_plus(before, self.text.place(leaf)), low)
@@ -402,7 +402,7 @@ class _Maker:
         return self._cycle(doc, f"{self.names.levels[level.name]}_cycle", *before, *rest)
 
     def _chosen(self, choice: model.TableChoice) -> str:
-        """The function of the table that a choice runs."""
+        """Spell the function of the table that a choice runs."""
         if isinstance(choice, model.OneTable):
             return f"_run_{self.names.tables[choice.table]}"
         selector = choice.selector
@@ -411,7 +411,7 @@ class _Maker:
         return f"{{{rows}}}[{IN_PYTHON.code(self.text.expr(selector))}]"
 
     def _stage(self, choice: model.TableChoice) -> Iterator[Stmt]:
-        """As in C: the trace's line is the last table's, a fault for want of a line names the table."""
+        """Yield code for a table that others follow, as in C: the line is the last table's; a fault for want of a line names this one."""
         yield Frame(("try:",), (_run(self._chosen(choice)),))
         yield Frame(("finally:",), (Set(LINE, Constant(-1)),))
         unmatched = infix("<=", Constant(Fault.NO_LINE), FAULT, Constant(Fault.SEVERAL_LINES))
@@ -426,7 +426,6 @@ class _Maker:
 
 
 def _on_state(doc: str, name: str, *body: Stmt) -> Function:
-    """A function of the state."""
     return Function(doc, f"{name}(s)", body)
 
 
@@ -443,7 +442,7 @@ def _refused(position: int) -> Leave:
 
 
 def _admitted(variable: Variable, place: Code, refuse: Stmt) -> Iterator[Stmt]:
-    """Clamps the place, or refuses; a NaN satisfies no comparison."""
+    """Yield statements that clamp the place, or refuse; a NaN satisfies no comparison."""
     kind = variable.type
     low, high = _ends(kind)
     if variable.admit is model.Admit.CLAMP:
@@ -455,7 +454,7 @@ def _admitted(variable: Variable, place: Code, refuse: Stmt) -> Iterator[Stmt]:
 
 
 def _ends(kind: model.Scalar) -> tuple[Constant, Constant]:
-    """The ends of a range; those of a truth are 0 and 1."""
+    """Return the ends of a range; those of a truth are 0 and 1."""
     if isinstance(kind, Real):
         return constant(kind, kind.low), constant(kind, kind.high)
     low, high = key_bounds(kind)
@@ -468,7 +467,7 @@ def _within(kind: model.Scalar, place: Code) -> Code:
 
 
 def _less(place: Code, low: int) -> Code:
-    """The place less `low`."""
+    """Return the place less `low`."""
     return place if low == 0 else infix("-" if low > 0 else "+", place, Constant(abs(low)))
 
 
@@ -477,12 +476,12 @@ def _plus(before: Code | None, more: Code) -> Code:
 
 
 def _joined(group: Group, names: dict[int, Name]) -> str:
-    """The masks of a group, made when the module is imported."""
+    """Spell the joined masks of a group, computed when the module is imported."""
     return f"_joined({', '.join(names[id(probe)].text for probe in group)})"
 
 
 def _typed(kind: model.Scalar, value: Code) -> Code:
-    """Code that gives the value as one of its kind, else a NaN, which no range holds."""
+    """Return code that converts the value to its kind, or to a NaN, which no range holds."""
     if isinstance(kind, Single):
         return Invoke("_single", (Invoke("_real", (value,)),))
     return Invoke("_real" if isinstance(kind, Real) else "_whole", (value,))

@@ -60,7 +60,7 @@ class Ranges:
     known: Mapping[str, Ends] = field(default_factory=dict)
 
     def of(self, expr: Expr) -> Ends:
-        """Bounds of a number."""
+        """Return the bounds of a number."""
         kind = expr.type
         assert isinstance(kind, Int | Real)
         match expr:
@@ -82,7 +82,7 @@ class Ranges:
         return replace(kind, low=low, high=high)
 
     def where(self, condition: Expr, *, holds: bool = True) -> "Ranges":
-        """The ranges where a condition holds, or where it does not."""
+        """Return the ranges where a condition holds, or where it does not."""
         match condition:
             case Apply(op=Op.NOT, args=(inner,)):
                 return self.where(inner, holds=not holds)
@@ -100,12 +100,12 @@ class Ranges:
                 return self
 
     def compared(self, expr: Expr, op: Comparison, other: Ends) -> "Ranges":
-        """The ranges where a number stands in this relation to some value between the ends."""
+        """Return the ranges where a number stands in this relation to some value between the ends."""
         key, own = _key(expr), self.of(expr)
         return Ranges({**self.known, key: _met(own, _compared(op, own, other, expr))}) if key else self
 
     def after(self, statement: Statement) -> "Ranges":
-        """The ranges after a statement: an assignment is kept within what its place is declared to hold."""
+        """Return the ranges after a statement; an assigned value stays within the declared range of its place."""
         left = self.without((statement,))
         match statement:
             case Assign(place=ToLeaf(name=name, type=kind), value=value):
@@ -121,7 +121,7 @@ class Ranges:
         return Ranges({**left.known, key: _met((kind.low, kind.high), self.of(value))})
 
     def without(self, body: Iterable[Statement]) -> "Ranges":
-        """The ranges of what no statement of a body writes; a call may write any leaf."""
+        """Return the ranges of variables that no statement of a body writes; a call may write any leaf."""
         inside = [*everything(body)]
         written = {str(name) for statement in inside for name in written_by(statement)}
         written |= {_LOCAL + name for statement in inside for name in _locals(statement)}
@@ -130,23 +130,23 @@ class Ranges:
         return self.forgetting(written)
 
     def forgetting(self, names: Collection[str]) -> "Ranges":
-        """The ranges of other variables."""
+        """Return the ranges of all other variables."""
         return Ranges({key: ends for key, ends in self.known.items() if key not in names})
 
     def joined(self, other: "Ranges") -> "Ranges":
-        """The ranges where two ways meet."""
+        """Return the ranges where two ways meet."""
         both = self.known.keys() & other.known.keys()
         hulls = {key: (self.known[key], other.known[key]) for key in sorted(both)}
         return Ranges({key: (min(a, c), max(b, d)) for key, ((a, b), (c, d)) in hulls.items()})
 
     def met(self, other: "Ranges") -> "Ranges":
-        """The ranges where both hold."""
+        """Return the ranges where both hold."""
         both = {key: _met(ends, other.known.get(key, ends)) for key, ends in self.known.items()}
         return Ranges({**other.known, **both})
 
 
 def at_line(table: Table, line: Line | Default, program: Program) -> Ranges:
-    """What a line states, before its actions."""
+    """Return the ranges that a line states, before its actions."""
     ranges = Ranges()
     for test in line.tests if isinstance(line, Line) else ():
         ranges = ranges.where(test.condition) if test is not None else ranges
@@ -155,7 +155,7 @@ def at_line(table: Table, line: Line | Default, program: Program) -> Ranges:
 
 
 def at_procedures(program: Program) -> Mapping[str, Ranges]:
-    """By procedure, what every line that calls it states of leaves that no action before it writes."""
+    """Return, by procedure, the ranges that every line calling it states of leaves not written by earlier actions."""
     writes = {procedure.name: set(map(str, procedure.writes)) for procedure in program.procedures}
     found: dict[str, Ranges] = {}
 
@@ -181,7 +181,7 @@ def at_procedures(program: Program) -> Mapping[str, Ranges]:
 
 
 def _key(expr: Expr) -> str:
-    """What a variable is known by; empty for what is none."""
+    """Return the key of a variable; "" for any other expression."""
     match expr:
         case Read(name=name):
             return name
@@ -192,20 +192,20 @@ def _key(expr: Expr) -> str:
 
 
 def _locals(statement: Statement) -> Iterator[str]:
-    """The locals that a statement itself writes."""
+    """Yield the locals that a statement itself writes."""
     match statement:
         case Local(name=name) | Assign(place=ToLocal(name=name)):
             yield name
 
 
 def _met(one: Ends, other: Ends) -> Ends:
-    """What is in both; the first where nothing is, which is then never reached."""
+    """Return the intersection; the first where it is empty, as such code is never reached."""
     low, high = max(one[0], other[0]), min(one[1], other[1])
     return (low, high) if low <= high else one
 
 
 def _compared(op: Comparison, ends: Ends, other: Ends, expr: Expr) -> Ends:
-    """The ends within which a number lies that stands in this relation to some value between other ends.
+    """Return the ends of a number that stands in this relation to some value between other ends.
 
     A real is not brought below the next one: that is more than every analyser does.
     """

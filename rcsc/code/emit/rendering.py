@@ -19,7 +19,7 @@ BREAK = re.compile(r"(?:&&|\|\||[<>!=]=|[<>?:&|+,]) ")
 
 @cache
 def environment() -> jinja2.Environment:
-    """A strict environment: a template that misspells an attribute fails."""
+    """Return a strict environment: a template that misspells an attribute fails."""
     templates = jinja2.Environment(
         loader=jinja2.PackageLoader("rcsc.code.emit"),
         undefined=jinja2.StrictUndefined,
@@ -33,7 +33,7 @@ def environment() -> jinja2.Environment:
 
 
 def render(template: str, view: Mapping[str, object]) -> str:
-    """The template laid out with these values."""
+    """Lay out the template with these values."""
     text = environment().get_template(template).render(view)
     if not template.endswith((".c.jinja", ".h.jinja")):
         return text
@@ -42,7 +42,7 @@ def render(template: str, view: Mapping[str, object]) -> str:
 
 
 def folded(line: str) -> Iterator[str]:
-    """A line of C as lines of at most `WIDTH` columns, as far as it can be broken.
+    """Fold a line of C into lines of at most `WIDTH` columns, as far as it can be broken.
 
     A comment that follows code stands before it then. Code breaks after an operator or a comma that is least nested, and after
     the sign of an assignment where nothing else is left.
@@ -69,7 +69,7 @@ def _comment(words: str, pad: str) -> Iterator[str]:
 
 
 def _code(code: str, pad: str, step: str) -> Iterator[str]:
-    """Fills lines with the pieces of code; a piece that is too long by itself is broken in turn."""
+    """Fill lines with the pieces of code; a piece that is too long by itself is broken in turn."""
     pieces = _pieces(code)
     if len(pad) + len(code) > WIDTH and len(pieces) == 1:
         pieces = code.replace(" = ", " =\n", 1).split("\n")
@@ -88,7 +88,7 @@ def _code(code: str, pad: str, step: str) -> Iterator[str]:
 
 
 def _pieces(code: str) -> list[str]:
-    """The code, broken wherever it is nested least."""
+    """Break the code wherever it is nested least."""
     depth, ends = 0, dict[int, list[int]]()
     for at, character in enumerate(code):
         depth += (character in "([{") - (character in ")]}")

@@ -27,12 +27,12 @@ LEAST_WORD, LEAST_STEM = 3, 6
 
 
 def short(name: str) -> str:
-    """`name`; a very long one is cut, with a digest of the whole."""
+    """Return `name`; a very long one is cut, with a digest of the whole."""
     return name if len(name) <= LONGEST else f"{name[:LONGEST]}_{_digest(name, 8)}"
 
 
 def abbreviated(name: str, most: int) -> str:
-    """`name` in at most `most` characters.
+    """Shorten `name` to at most `most` characters.
 
     >>> abbreviated("VOCABULARY_EMOVE_COMMAND_MOVE_TO_OBJ", 31)
     'VCBLRY_EMOVE_CMND_MOVE_TO_OBJ'
@@ -52,7 +52,7 @@ def abbreviated(name: str, most: int) -> str:
 
 
 def _consonants(word: str) -> str:
-    """A word without vowels after its first letter, doubled letters once."""
+    """Drop a word's vowels after its first letter, and write doubled letters once."""
     return re.sub(r"([A-Za-z])\1", r"\1", word[0] + re.sub(r"[aeiouAEIOU]", "", word[1:]))
 
 
@@ -61,7 +61,7 @@ def _cut(word: str) -> str:
 
 
 def hashed(name: str, most: int) -> str:
-    """A name's beginning and a digest of the whole; where there is no room for both the digest, after a letter."""
+    """Return a name's beginning and a digest of the whole; without room for both, its first letter and the digest."""
     digits = min(8, most - 1)
     digest = _digest(name, digits)
     digest = digest.upper() if name.isupper() else digest
@@ -85,19 +85,19 @@ class NameScope:
     significant: int = 0
 
     def __post_init__(self) -> None:
-        """Keeps of each name what is significant."""
+        """Keep the significant part of each name."""
         self.names = set(map(self.key, self.names))
 
     def fresh(self, name: str) -> str:
-        """`name`, made short where that tells it apart, or the first of `name_2`, `name_3` that is free; it is then taken."""
+        """Take `name`, shortened where that makes it unique, or the first of `name_2`, `name_3` that is free."""
         free = next(variant for variant in self._variants(name) if self.free(variant))
         self.names.add(self.key(free))
         return free
 
     def distinct(self, names: Sequence[str]) -> tuple[str, ...]:
-        """A spelling for each name of a group, which is made short alike where some are alike in what is significant.
+        """Return a spelling for each name of a group; names that are alike in their significant part are shortened.
 
-        Where few are alike, or the words that all begin with would lose too much, only those that are alike are.
+        All are shortened in the same way, unless few are alike, or the words that all begin with would lose too much.
         """
         groups: dict[str, set[str]] = {}
         for name in names:
@@ -111,7 +111,7 @@ class NameScope:
         return tuple(self.fresh(self._within(name, groups[self.key(name)])) for name in names)
 
     def all(self, wanted: Iterable[tuple[str, str]], claims: "Claims | None" = None) -> dict[str, str]:
-        """A spelling for each name, in order.
+        """Return a spelling for each name, in order.
 
         Args:
             wanted: Each name, and the word that is wanted for it. Those that are the name itself are given first.
@@ -134,15 +134,15 @@ class NameScope:
         raise AssertionError(word)
 
     def key(self, name: str) -> str:
-        """Return what of a name is significant."""
+        """Return the significant part of a name."""
         return name[: self.significant] if self.significant else name
 
     def free(self, name: str) -> bool:
-        """Return whether no name is alike."""
+        """Return whether no name taken is alike."""
         return self.key(name) not in self.names
 
     def _within(self, name: str, alike: set[str]) -> str:
-        """The name with what it shares with those made short, as far as the longest of the others needs."""
+        """Return the name with the beginning shared by those alike shortened as far as the longest of them needs."""
         if len(alike) == 1:
             return name
         shared = _shared(alike)
@@ -152,7 +152,7 @@ class NameScope:
         return f"{abbreviated(shared, room)}{name[len(shared) :]}"
 
     def _room(self, shared: str, names: Iterable[str]) -> int:
-        """Characters to which words that names begin with are cut, so that all of the longest is significant."""
+        """Return how many characters the shared beginning may have, so that all of the longest name is significant."""
         return self.significant - 1 - max(len(name) - len(shared) - 1 for name in names) if shared else 0
 
     def _variants(self, name: str) -> Iterator[str]:
@@ -166,7 +166,7 @@ class NameScope:
 
 
 def _shared(names: Iterable[str]) -> str:
-    """The words that names begin with."""
+    """Return the words with which all names begin."""
     first, *others = (name.split("_") for name in sorted(names))
     alike = takewhile(lambda words: len(set(words)) == 1, zip(first[:-1], *others, strict=False))
     return "_".join(words[0] for words in alike)
@@ -176,12 +176,12 @@ Claims = Callable[[str], Iterable[tuple[NameScope, str]]]
 
 
 def c_scope(names: Iterable[str] = ()) -> NameScope:
-    """A namespace of C."""
+    """Return a namespace of C, whose names differ within their first `SIGNIFICANT` characters."""
     return NameScope(set(names), SIGNIFICANT)
 
 
 def _stems(word: str) -> Iterator[str]:
-    """The word; numbered, and made shorter and shorter; at last, digests of it."""
+    """Yield the word; then numbered and ever shorter ones; at last, digests of it."""
     yield word
     yield from (f"{word}_{number}" for number in range(2, 10))
     for most in range(min(len(word), SIGNIFICANT) - 1, LEAST_WORD, -1):

@@ -37,17 +37,17 @@ FAULTLESS, FAULTED = infix("==", FAULT, Constant(0)), infix("!=", FAULT, Constan
 
 
 def constant(kind: Scalar, value: Value) -> Constant:
-    """A constant in the type that values of the kind are computed in."""
+    """Return a constant in the type in which values of the kind are computed."""
     return Constant(value, {model.Bool: "bool", Real: "double", Single: "float"}.get(type(kind), "int64_t"))
 
 
 def local(name: str) -> Name:
-    """A parameter, local or loop variable of a procedure."""
+    """Return the name of a parameter, local or loop variable of a procedure."""
     return Name(local_word(name))
 
 
 def local_word(name: str) -> str:
-    """How a parameter, local or loop variable is called in both languages; names of one procedure differ within 31 characters."""
+    """Spell a parameter, local or loop variable, alike in both languages; names of one procedure differ within 31 characters."""
     return f"v_{name}" if len(name) <= SIGNIFICANT - 2 else f"v_{hashed(name, SIGNIFICANT - 2)}"
 
 
@@ -64,38 +64,38 @@ class Text(ABC):
 
     @abstractmethod
     def place(self, leaf: str) -> Place:
-        """A leaf."""
+        """Return the place of a leaf in the state."""
 
     @abstractmethod
     def expr(self, expr: Expr) -> Code:
-        """An expression."""
+        """Return the code of an expression."""
 
     @abstractmethod
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
-        """Whether it is one of the values."""
+        """Return the condition that the subject is one of the values."""
 
     @abstractmethod
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
-        """A value for a leaf or a local of this kind: no -0.0."""
+        """Return a value for a leaf or a local of this kind, without -0.0."""
 
     @abstractmethod
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
-        """An assignment."""
+        """Return the code of an assignment."""
 
     @abstractmethod
     def case(self, statement: model.Case) -> Body:
-        """A choice among blocks by a value."""
+        """Return the code that chooses a block by a value."""
 
     @abstractmethod
     def function(self, procedure: str) -> str:
-        """The function of a procedure."""
+        """Return the name of a procedure's function."""
 
     def block(self, body: Sequence[Statement]) -> Body:
-        """Statements."""
+        """Return the code of statements."""
         return tuple(stmt for statement in body for stmt in self.statement(statement))
 
     def statement(self, statement: Statement) -> Iterator[Stmt]:
-        """A statement."""
+        """Yield the code of a statement."""
         match statement:
             case model.Assign(place=place, value=value):
                 yield self.assigned(place, value)
@@ -115,11 +115,11 @@ class Text(ABC):
                 assert_never(statement)
 
     def guard(self, _loop: model.For) -> tuple[Code, ...]:
-        """What must hold in a loop that it goes on."""
+        """Return the conditions under which a loop goes on."""
         return ()
 
     def call(self, name: str, args: Sequence[Expr] = ()) -> Invoke:
-        """A call of a procedure."""
+        """Return a call of a procedure."""
         kinds = self.parameters.get(name, tuple(arg.type for arg in args))
         given = (self.stored(kind, arg) for kind, arg in zip(kinds, args, strict=True))
         return Invoke(self.function(name), (STATE, *given))
@@ -135,7 +135,7 @@ _ROUNDED = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV})
 
 
 def _many_digits(kind: Int) -> bool:
-    """Whether a double holds not every number of the type."""
+    """Return whether some number of the type does not fit a double exactly."""
     return max(abs(kind.low), abs(kind.high)) > 1 << 53
 
 
@@ -146,15 +146,15 @@ class PyText(Text):
     cases: int = 0
 
     def place(self, leaf: str) -> Place:
-        """A leaf."""
+        """Return the place of a leaf in the state."""
         return Place((self.names.attributes[leaf],))
 
     def function(self, procedure: str) -> str:
-        """The function of a procedure."""
+        """Return the name of a procedure's function."""
         return f"_do_{self.names.procedures[procedure]}"
 
     def expr(self, expr: Expr) -> Code:
-        """An expression."""
+        """Return the code of an expression."""
         match expr:
             case model.Literal(value=value, type=kind):
                 code = constant(kind, value)
@@ -176,7 +176,7 @@ class PyText(Text):
                 assert_never(expr)
 
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
-        """Whether it is one of the values."""
+        """Return the condition that the subject is one of the values."""
         return infix("in", subject, Items(tuple(constant(kind, value) for value in values)))
 
     @staticmethod
@@ -208,12 +208,12 @@ class PyText(Text):
                 assert_never(op)
 
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:  # noqa: ARG002 - all are alike
-        """A value to keep."""
+        """Return a value to keep."""
         code = self.expr(value)
         return infix("+", code, constant(kind, 0)) if isinstance(kind, Real) else code
 
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
-        """An assignment."""
+        """Return the code of an assignment."""
         given = self.stored(place.type, value)
         match place:
             case model.ToLeaf(name=name):
@@ -225,7 +225,7 @@ class PyText(Text):
                 return Set(local(name), given)
 
     def case(self, statement: model.Case) -> Body:
-        """A chain of `if`."""
+        """Return a chain of `if`."""
         self.cases += 1
         subject = Name(f"case_{self.cases}")
         let = Set(subject, self.expr(statement.subject))

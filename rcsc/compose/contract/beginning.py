@@ -19,7 +19,7 @@ Starts: TypeAlias = Mapping[str, Mapping[str, Value]]
 
 
 class BadStartError(CodedError):
-    """The text names what no level has, or values with which no run can begin."""
+    """The text names a leaf that no level has, or values with which no run can begin."""
 
     code = Code.BAD_START
 
@@ -29,10 +29,10 @@ class BadStartError(CodedError):
 
 
 def starts(systems: Mapping[str, TransitionSystem], text: str) -> dict[str, dict[str, Value]]:
-    """Read `leaf = value, level.leaf = value, ...`; a deferred leaf has no other value pending, unless that is named, too.
+    """Read `leaf = value, level.leaf = value, ...`; a deferred leaf gets the same pending value, unless that is named, too.
 
     Raises:
-        BadStartError: It is not written so, or names no leaf, no value of the leaf, or values that an invariant excludes.
+        BadStartError: The text is malformed, or names no leaf, no value of the leaf, or values that an invariant excludes.
     """
     by_level: dict[str, dict[str, Value]] = {}
     for part in filter(None, map(str.strip, text.split(","))):
@@ -50,7 +50,7 @@ def starts(systems: Mapping[str, TransitionSystem], text: str) -> dict[str, dict
 
 
 def _leaf(systems: Mapping[str, TransitionSystem], name: str) -> tuple[str, str]:
-    """Find the level and the leaf that are meant; a level's name may stand before the leaf."""
+    """Return the level and the leaf that a name means; the level's name may stand before the leaf's."""
     everywhere = {(level, leaf) for level, ts in systems.items() for leaf in initial(ts.program)}
     meant = sorted({(level, leaf) for level, leaf in everywhere if name in {leaf, f"{level}.{leaf}"}})
     if len(meant) == 1:
@@ -80,7 +80,7 @@ def _value(leaf: str, kind: Scalar, text: str) -> Value:
 
 
 def _values(kind: Scalar, text: str) -> Iterator[str]:
-    """Say which values a leaf can have."""
+    """Yield hints that tell the values of a leaf, a similar member first."""
     match kind:
         case Enum(members=members):
             yield from (f"did you mean `{word}`?" for word in get_close_matches(text, members, n=1))

@@ -36,7 +36,7 @@ STANDS: Key = ("its report stands once it has answered", "", "")
 
 
 class Verdict(StrEnum):
-    """Whether a claim holds, given what it rests on."""
+    """The verdict on a claim, given the claims it rests on."""
 
     PROVED = "proved"
     NOT_PROVED = "not proved"  # a state within the invariant breaks it, perhaps one that is never reached
@@ -71,12 +71,12 @@ class Promise:
         level: The level that assumes it.
         record: The input that it is about.
         assumed: The assumption in words; `reason`, who guarantees it.
-        needs: What must be proved of the neighbour.
-        own: What the level itself must keep: reports are about its orders only if it numbers them.
+        needs: Claims that must be proved of the neighbour.
+        own: Claims that the level itself must keep: reports are about its orders only if it numbers them.
         begins: Whether both sides agree initially.
         outside: Whether the neighbour stands outside the levels, and must keep it by its own means.
         holds: Whether the neighbour's claims are accepted, given what they rest on; set once there are proofs.
-        fact: The declared assumption that it is; empty for what the protocol says.
+        fact: The name of the declared assumption; empty for one of the protocol.
     """
 
     level: str
@@ -129,7 +129,7 @@ UNKNOWN = Closed(Verdict.UNLOOKED)
 
 
 def closed(claims: Mapping[Need, Claim]) -> dict[Need, Closed]:
-    """Close claims under what they rest on: compute the least sets that each lacks and trusts."""
+    """Compute, for each claim, the least sets of claims that it lacks and of assumptions that it trusts, directly or not."""
     lacks: dict[Need, frozenset[Need]] = dict.fromkeys(claims, frozenset())
     trusts = {need: frozenset(claim.trusts) for need, claim in claims.items()}
     grows = True
@@ -174,13 +174,13 @@ something ends the second."""
 
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
-    """Select the assumptions of tables, and what is assumed of refusals, from what is trusted, in order."""
+    """Select from what is trusted, in order, the assumptions of tables and those about refusals."""
     named = (trust for trust in set(trusts) if trust.endswith(DECLARED) or of_refusals(trust))
     return tuple(sorted(trust.removesuffix(DECLARED) for trust in named))
 
 
 def of_refusals(trust: str) -> bool:
-    """Return whether something is trusted not to be refused, at all or for ever."""
+    """Return whether the assumption is that something is not refused, at all or for ever."""
     return trust.endswith((NEVER_REFUSED, NOT_FOR_EVER, IN_RANGE))
 
 

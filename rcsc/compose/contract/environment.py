@@ -116,7 +116,7 @@ class Given:
     Attributes:
         name: The assumption.
         record: The input that it is about; `writer`, the level that writes it.
-        condition: What it says, of this level's leaves.
+        condition: The condition, over this level's leaves.
     """
 
     name: str
@@ -127,11 +127,11 @@ class Given:
 
 @dataclass(frozen=True, slots=True)
 class Owed:
-    """What a level that reads one of this level's outputs assumes of it.
+    """An assumption of another level about an output of this one, which it reads.
 
     Attributes:
         name: `READER.ASSUMPTION`.
-        condition: What it says, of this level's leaves.
+        condition: The condition, over this level's leaves.
     """
 
     name: str
@@ -146,7 +146,7 @@ class Links:
         free: Inputs of which only the range is known.
         unread: Buffers that resemble orders and reports and are not recognised, each with what is missing.
         written: Each input that a level of the system writes, with that level and its output: nothing is taken for granted of them.
-        given: What this level declares of them and their writers owe; `owes`, what it owes itself.
+        given: The assumptions that this level declares about them, and their writers owe; `owes`, those that it owes itself.
     """
 
     level: str
@@ -279,7 +279,7 @@ def _subordinate(program: Program, owner: str, role: Role, outside: bool) -> Bel
 
 
 def _asked(system: Description, level: str, program: Program) -> tuple[Asked, ...]:
-    """Return what a level asks of the database.
+    """Return the questions of a level to the database.
 
     Raises:
         BadDescription: A question has an answer of the database as a key.

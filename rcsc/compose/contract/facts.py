@@ -47,7 +47,7 @@ def believed(program: Program, level: Level) -> list[Assumption]:
 
 
 def with_facts(every: Mapping[str, Links], programs: Mapping[str, Program]) -> dict[str, Links]:
-    """Return the links of all levels with what each is given and owes."""
+    """Return the links of all levels with the facts that each is given and owes."""
     given = {
         name: tuple(_given(links, programs[name], level))
         for name, links in every.items()
@@ -61,7 +61,7 @@ def with_facts(every: Mapping[str, Links], programs: Mapping[str, Program]) -> d
 
 
 def _given(links: Links, program: Program, level: Level) -> Iterator[Given]:
-    """Yield the assumptions about one buffer that a level writes, and nothing else."""
+    """Yield the level's assumptions about just one buffer, which another level writes."""
     kinds = {str(variable.name): variable.kind for variable in program.variables}
     for assumption in believed(program, level):
         read = [str(name) for name in read_by(assumption.condition)]
@@ -71,7 +71,7 @@ def _given(links: Links, program: Program, level: Level) -> Iterator[Given]:
 
 
 def _owed(writer: str, every: Mapping[str, Links], given: Mapping[str, tuple[Given, ...]]) -> Iterator[Owed]:
-    """Yield what other levels assume of what this one writes, in its own words."""
+    """Yield the assumptions of other levels about this one's outputs, over its own leaves."""
     for reader, facts in given.items():
         for fact in facts:
             end = every[reader].written_as(fact.record)

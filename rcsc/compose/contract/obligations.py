@@ -29,7 +29,7 @@ ANSWER, SETTLES = "answered", "settling"
 
 
 class Sort(StrEnum):
-    """What an obligation is about; the value is how it is shown."""
+    """The sort of an obligation; the value is the text shown for it."""
 
     ASSUMPTION = "assumption"
     SOME_LINE = "some line matches"
@@ -191,7 +191,7 @@ def may_meet(table: Table) -> list[tuple[int, int]]:
 
 
 def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """State what the superior assumes of this level."""
+    """State the superior's assumptions about this level."""
     if (above := ts.links.above) is None:
         return
     number = values.equal(cycle.after[above.echo], cycle.taken[above.number])
@@ -207,15 +207,15 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def _echo_stands(ts: TransitionSystem, above: Above) -> bool:
-    """Return whether a restart leaves what the report echoes as it was: else an older report may follow a newer one."""
+    """Return whether a restart keeps the echo in the report: else an older report may follow a newer one."""
     return all(ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed))
 
 
 def _answer_stays(ts: TransitionSystem, cycle: Cycle, above: Above) -> Iterator[Obligation]:
-    """State that what was reported of the order taken last stays, but of the command that rests; what stands at a restart has failed.
+    """State that an answer to the order taken last stays, unless the command rests; after a restart that answer is *failed*.
 
     Levels that declare whom they serve state it as properties. No proof of a neighbour takes it for granted: the contract says nothing of
-    a status, and that an answer comes and stays is shown by a level's own termination, on which that of its superior rests.
+    a status. That an answer comes and stays is shown by a level's own termination, on which that of its superior rests.
     """
     kind = ts.kinds[above.status]
     if not isinstance(kind, Enum):
@@ -239,7 +239,7 @@ def _answer_stays(ts: TransitionSystem, cycle: Cycle, above: Above) -> Iterator[
 
 
 def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """State what the subordinates assume of this level, and that it waits for them."""
+    """State the subordinates' assumptions about this level, and that it waits for them."""
     for below in ts.links.below:
         before, after = cycle.before[below.number], cycle.after[below.number]
         same = values.equal(before, after)
@@ -259,7 +259,7 @@ def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def counts_on(ts: TransitionSystem, below: Below) -> bool:
-    """Return whether the order of a restart has a number that none had before: the subordinate may have taken any other already."""
+    """Return whether a restart gives the order a number that none had before: the subordinate may have taken any earlier one."""
     return ts.program.adopted.get(below.number) == After(below.echo)
 
 
@@ -314,7 +314,7 @@ def has_flag(ts: TransitionSystem) -> bool:
 
 
 def unstated(ts: TransitionSystem) -> tuple[Unstated, ...]:
-    """List the obligations that cannot be stated, each with what is missing."""
+    """List the obligations that cannot be stated, each with the reason."""
     return tuple(_unstated(ts))
 
 
@@ -358,7 +358,7 @@ def _by_its_orders(ts: TransitionSystem) -> bool:
 
 
 def _keeps(ts: TransitionSystem, table: Table) -> bool:
-    """Return whether a table of a command looks at what the level itself keeps: it may be of the command before."""
+    """Return whether a table of a command reads a state that the level itself keeps: it may stem from the command before."""
     roles = ts.program.roles
     assert roles is not None
     kept = {
@@ -368,7 +368,7 @@ def _keeps(ts: TransitionSystem, table: Table) -> bool:
 
 
 def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
-    """Yield why PAUSE is not recognised: it is the first command, with a table of its own."""
+    """Yield reasons why PAUSE is not recognised: it is the first command, with a table of its own."""
     assert ts.links.above is not None
     if isinstance(ts.level.tables, OneTable) and ts.program.roles is None:
         yield "the level has one table for all commands"
@@ -403,7 +403,7 @@ def _rests(ts: TransitionSystem, table: Table) -> bool:
 
 
 def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """State what the program itself claims: invariants and properties."""
+    """State the invariants and properties of the program, and the facts that it owes other levels."""
     for name, holds in invariants(ts.program, cycle):
         yield Obligation(Sort.INVARIANT, "", name, holds)
     for name, holds in properties(ts.program, cycle):

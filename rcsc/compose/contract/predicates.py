@@ -52,7 +52,7 @@ CLOSELY = 1
 
 @dataclass(frozen=True, slots=True)
 class Predicate:
-    """A leaf's truth value or member; or whether the leaf equals another one, or what a module computes for it.
+    """A leaf's truth value or member; or whether the leaf equals another leaf, or the value that a module computes for it.
 
     Attributes:
         parts: Whether it partitions the states.
@@ -84,7 +84,7 @@ class Predicate:
 
     @property
     def size(self) -> int:
-        """How many values it has."""
+        """The number of its values."""
         return len(self.kind.members) if isinstance(self.kind, Enum) else 2
 
     def node(self, leaves: Leaves) -> Node:
@@ -158,7 +158,7 @@ def predicates(
 
 
 def _kept(program: Program) -> Iterator[tuple[str, str]]:
-    """Pair what a cycle looks back at with the leaf that it was: after every cycle but a fault they are equal."""
+    """Pair each kept copy of an earlier value with its leaf: after every cycle but a fault they are equal."""
     yield from ((str(v.name), str(v.previous_of)) for v in program.variables if v.previous_of is not None)
 
 
@@ -272,7 +272,7 @@ def _durations(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predica
 
 
 def _cells_looked_back_at(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
-    """Make predicates of what cells said of inputs in the cycle before, where a fact about their change carries it on."""
+    """Make predicates of cells about the inputs of the cycle before, where a fact about their change carries them on."""
     kept, seen = looked_back_at(ts.program), set()
     for table in ts.program.tables:
         for test in (test for line in table.lines for test in line.tests if test is not None):
@@ -302,13 +302,13 @@ def _may_fail(part: Expr) -> bool:
 
 
 def looked_back_at(program: Program) -> dict[VariableName, VariableName]:
-    """Map each input that something looks back at to the state that keeps it."""
+    """Map each input that something looks back at to the state that keeps its earlier value."""
     inputs = {v.name for v in program.variables if v.kind is Kind.INPUT}
     return {v.previous_of: v.name for v in program.variables if v.previous_of in inputs}
 
 
 def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str]) -> Iterator[Predicate]:
-    """Make predicates of what procedures branch on: truth values, members, numbers compared with constants."""
+    """Make predicates of the conditions in procedures: truth values, members, numbers compared with constants."""
     kinds, seen = ts.kinds, set()
     for condition in _decisions(ts.program):
         for name in dict.fromkeys(map(str, read_by(condition))):
@@ -351,7 +351,7 @@ def compared(program: Program) -> Iterator[tuple[str, str]]:
 
 
 def _questions(ts: TransitionSystem) -> Iterator[tuple[str, str]]:
-    """Pair what was asked of the database with what would be asked now."""
+    """Pair each key of a database question as last asked with the key as it is now."""
     for asked in ts.links.asked:
         for key in asked.keys:
             yield f"{GHOST}{asked.into} {key}", key

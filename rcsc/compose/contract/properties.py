@@ -60,7 +60,7 @@ def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
 
 
 def owed(links: Links, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """Yield what other levels assume of what the level writes: it may be read as it stood before the cycle, too."""
+    """Yield each owed fact's name, and its condition before and after the cycle: it may be read as it stood before, too."""
     for fact in links.owes:
         yield fact.name, values.both(_true(fact.condition, cycle.before), _true(fact.condition, cycle.after))
 
@@ -239,7 +239,7 @@ def _stated_predicates(
 
 
 def _of_answers(ts: TransitionSystem, cycle: Cycle, inside: frozenset[str]) -> Iterator[Predicate]:
-    """Make the predicates of what a level that writes the protocol by hand has reported of the order taken last."""
+    """Make predicates of the answers to the order taken last, for a level that writes the protocol by hand."""
     above = ts.links.above
     if above is None or ts.program.roles is not None or not isinstance(kind := ts.kinds[above.status], Enum):
         return

@@ -173,7 +173,7 @@ def _matches(run: Run, line: Line) -> Node:
 
 @dataclass(frozen=True, slots=True)
 class Safety:
-    """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
+    """The reason why cycles as nodes agree with the executors: every operation is defined, and every value in range.
 
     Attributes:
         invariants: The program's invariants under which that was shown; empty if it is so in any state.
@@ -191,8 +191,8 @@ class TransitionSystem:
     Attributes:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
-        trusted: Assumptions about what stands outside that the tables declare: part of the contract.
-        refusable: The inputs that may be refused, in declared order: what a level writes never is.
+        trusted: Declared assumptions about inputs from outside: part of the contract.
+        refusable: The inputs that may be refused, in declared order: an input that a level writes never is.
         clamped: The inputs that properties look back at and cycles move to the edge: where the level begins anew, none has done so yet.
         refuses: Whether cycles that an input ends are cycles, too, and inputs stand as they came where the level begins anew; else nothing
             is refused or stands outside its range, which is then to be trusted.
@@ -211,7 +211,7 @@ class TransitionSystem:
     clamped: tuple[str, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
-        """Derives types, inputs and trusted assumptions from the program."""
+        """Derive types, inputs and trusted assumptions from the program."""
         self.procedures = {procedure.name: procedure for procedure in self.program.procedures}
         self.kinds = {str(v.name): v.type for v in self.program.variables}
         self.inputs = tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
@@ -248,7 +248,7 @@ class TransitionSystem:
         return replace(self, refuses=False) if self.refuses else self
 
     def _of_the_environment(self) -> frozenset[str]:
-        """Find the *assumed* assumptions about what comes from outside; others are proved, here or where what they speak of is written."""
+        """Find the *assumed* assumptions about inputs from outside; others are proved, here or at the level that writes their leaves."""
         given = {fact.name for fact in self.links.given}
         wanted = [one for one in believed(self.program, self.level) if one.name not in given]
         if not wanted:
@@ -284,7 +284,7 @@ class TransitionSystem:
         """Find values of these inputs that make an assumption true wherever it stands, whatever the levels write.
 
         Args:
-            assumption: It speaks of what levels write, too.
+            assumption: It reads values that levels write, too.
             outside: The inputs that come from outside.
             kept: Values that some have already.
             trusted: Names of assumptions that have to be true with it.
@@ -390,9 +390,9 @@ class TransitionSystem:
         return self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
 
     def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:
-        """Return the cycle as it is if nothing is refused, and else as one that takes nothing (`Event.INPUT_REFUSED`).
+        """Return the cycle with the case that an input is refused: then it takes nothing (`Event.INPUT_REFUSED`).
 
-        What tables would have seen stays: none is chosen.
+        The leaves that tables would have seen stay: no table is chosen.
         """
         taken = values.negation(untaken)
 
@@ -476,7 +476,7 @@ class TransitionSystem:
     # --- the environment ---
 
     def _given(self, taken: Leaves) -> Node:
-        """Return the condition that what other levels write is as they owe it."""
+        """Return the condition that other levels write what they owe."""
         run = Run({}, {}, dict(taken))
         return values.all_of(run.evaluate(fact.condition) for fact in self.links.given)
 

@@ -21,7 +21,7 @@ class Walk:
 
     Attributes:
         now: The value of every leaf.
-        ghosts: What was asked of the database, as in `transition`.
+        ghosts: The last questions to the database, as in `transition`.
         ran: The tables and lines that ran.
     """
 

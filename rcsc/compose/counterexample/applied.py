@@ -41,10 +41,10 @@ MOST_TRIED = 100
 
 @dataclass(frozen=True, slots=True)
 class After:
-    """What comes of a change in the text.
+    """The result of a change in the text.
 
     Attributes:
-        outcome: Whether what is said of it is proved of the text.
+        outcome: Whether the claim about the change is proved of the text.
         ts: The level with the text's table, for runs; None where there is none with the same leaves.
         pairs: Lines that overlap then, by names.
     """
@@ -54,7 +54,7 @@ class After:
     pairs: tuple[tuple[str, str], ...] = ()
 
     def told(self, pieces: Sequence[str]) -> str:
-        """Put whether it is proved between the pieces of what is said of it."""
+        """Return the sentence with "proved" or "not proved" between its pieces."""
         return ("proved" if self.outcome is Outcome.HOLDS else "not proved").join(pieces)
 
 
@@ -79,8 +79,8 @@ class Text:
     """The text of one table.
 
     Attributes:
-        loaded: All files of its program; None where they do not say this table.
-        before: What is wrong with the table as it is, and `told`, with the program; None where that was not decided.
+        loaded: All files of its program; None where they do not state this table.
+        before: The errors of the table as it is, and `told`, those of the program; None where that was not decided.
         tried: How many changes were tried.
     """
 
@@ -103,16 +103,16 @@ class Text:
             self.told = {key(each) for each in serious(verdict.findings)}
 
     def _says(self, program: Program) -> bool:
-        """Return whether a program has the table, of variables of these types."""
+        """Return whether a program has this very table, and variables of the same types."""
         tables = [table for table in program.tables if table.name == self.table.name]
         return tables == [replace(self.table, stops=())] and _kinds(program) == _kinds(self.ts.program)
 
     # --- changes ---
 
     def parted(self, cell: PartingCell) -> After:
-        """Write a cell that parts two lines; proved: they never both match, the other runs, and nothing new is wrong.
+        """Write a cell that parts two lines. Proved means: they never both match, the other runs, and nothing new is wrong.
 
-        If all that the line loses is the other's, nothing falls to no line, or to DEFAULT, that did not before.
+        If all that the line loses is the other's, no further input falls to DEFAULT, or to no line.
         """
         made = self._made((cell.change(self.table),))
         if not isinstance(made, _Made):
@@ -127,7 +127,7 @@ class Text:
         return made.after(Outcome.FAILS)
 
     def together(self, cells: Sequence[PartingCell]) -> After | None:
-        """Write several cells; proved: no two lines both match. None where no text says that."""
+        """Write several cells. Proved means: no two lines both match. None where no text can state them."""
         changes = changes_of(self.ts.program, self.table, cells)
         if not changes:
             return None
@@ -137,7 +137,7 @@ class Text:
         return made.after(Outcome.FAILS if made.wrong.pairs else Outcome.HOLDS)
 
     def joined(self, row: NewLine, seen: Snapshot) -> After:
-        """Write a line for an input that no line matches; proved: it alone matches that, it overlaps no other, and closes what it says."""
+        """Write a line for a gap's input. Proved means: it alone matches that input, overlaps no other line, and closes what it claims."""
         made = self._made((Change(Place.LINE, texts=row.cells),))
         if not isinstance(made, _Made):
             return After(made)
@@ -153,7 +153,7 @@ class Text:
         return made.after(Outcome.HOLDS if right else Outcome.FAILS)
 
     def under(self, condition: str) -> Outcome:
-        """Have the table assume a condition in its text; proved: exactly one line matches under it, and under no weaker one."""
+        """Make the table assume a condition in its text. Proved means: exactly one line matches under it, and under no weaker one."""
         source = None if self.loaded is None else self.loaded.sources.get(self.table.span.file)
         text = None if source is None else assuming(source.text, str(self.table.name), condition)
         if self.loaded is None or source is None or text is None:
@@ -171,7 +171,7 @@ class Text:
         return Outcome.HOLDS if holds else Outcome.FAILS
 
     def _made(self, changes: tuple[Change, ...]) -> "_Made | Outcome":
-        """Write changes and prove what is then wrong; an outcome if that is not known, or if it is worse than before."""
+        """Write changes and prove the table again; return an outcome where that stays open, or is worse than before."""
         self.tried += 1
         if self.loaded is None or self.before is None or self.tried > MOST_TRIED:
             return Outcome.OPEN
@@ -191,7 +191,7 @@ class Text:
         return _Made(self._level(verdict), verdict.tables[0].table, self.before, wrong)
 
     def _verdict(self, program: Program) -> ProgramVerdict | None:
-        """Prove the program of the table; what is wrong with that is told as if nothing were assumed, as runs need not keep to it.
+        """Prove the table's program; the table itself is judged without assumptions, as runs need not keep to them.
 
         None where the budget ends first.
         """
@@ -227,7 +227,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class _Made:
-    """What a change made: the level, the table, what was wrong before, and what is."""
+    """The result of a change: the level, the table, and the errors before and after."""
 
     ts: TransitionSystem | None
     table: Table
@@ -236,16 +236,16 @@ class _Made:
 
     @property
     def names(self) -> list[str]:
-        """The lines, in order."""
+        """The names of the lines, in order."""
         return _names(self.table)
 
     @property
     def tests(self) -> Mapping[str, object]:
-        """What each line asks, by its name."""
+        """The conditions of each line, by its name."""
         return _tests(self.table)
 
     def after(self, outcome: Outcome) -> After:
-        """Return it with what comes of it."""
+        """Return the result with this outcome."""
         order = self.names
         pairs = sorted(tuple(sorted(pair, key=order.index)) for pair in self.wrong.pairs)
         return After(outcome, self.ts, tuple((first, second) for first, second in pairs))
@@ -259,14 +259,14 @@ def _names(table: Table) -> list[str]:
 
 
 def _tests(table: Table) -> Mapping[str, object]:
-    """What each line asks; columns where it asks nothing are left out, as `above` adds and takes such."""
+    """Return each line's conditions by its name; empty cells are left out, as `above` adds and takes such columns."""
     return {
         str(line.name): [test.condition for test in line.tests if test is not None] for line in table.lines
     }
 
 
 def _free(program: Program, table: Table) -> Program:
-    """A program with this table, which rests on no invariant."""
+    """Return a program with this table that has no invariants to rest on."""
     tables = (table if each.name == table.name else each for each in program.tables)
     return replace(program, invariants=(), tables=tuple(tables))
 
@@ -291,7 +291,7 @@ def assuming(text: str, name: str, condition: str) -> str | None:
 
 
 def _no_weaker(program: Program, table: Table) -> bool:
-    """Return whether no input that exactly one line matches is excluded by what the table assumes."""
+    """Return whether the table's assumptions allow every input that exactly one line matches."""
     universe = Universe()
     lines = lines_of(universe, table)
     assumed = Every(tuple(map(whole, assumptions_of(universe, program, table))))

@@ -35,7 +35,7 @@ MOST = 6
 
 
 class How(StrEnum):
-    """What comes of a finding."""
+    """The kinds of consequences of a finding."""
 
     ANSWERED = "answered"
     STOPS = "stops"
@@ -52,7 +52,7 @@ class Consequence:
     """One way in which a run goes on that breaks an obligation.
 
     Attributes:
-        before: What the superior took before the last cycle; `report`, what it takes after it.
+        before: The report that the superior took before the last cycle; `report`, the one it takes after it.
         run: The run; its `after` counts the cycles since the obligation is broken.
         first: The cycle, from 1, before which all is as at the end; 0 unless the run repeats.
         shared: Whether it begins as the run that shows the finding.
@@ -86,7 +86,7 @@ class Consequence:
 def consequences(
     ts: TransitionSystem, finding: Finding, search: TraceSearch, further: int
 ) -> tuple[Consequence, ...]:
-    """Find what follows a finding of one level that has a superior: runs that begin as the finding first, then the shortest.
+    """Find consequences of a finding of one level that has a superior: first runs that begin as the finding, then the shortest.
 
     Args:
         ts: The level.
@@ -109,12 +109,12 @@ def consequences(
 
 
 def reported(ts: TransitionSystem, leaves: Snapshot) -> Report:
-    """Return what the superior takes of a report."""
+    """Return the leaves of a report that tell answers apart, with their values."""
     return tuple((leaf, leaves[leaf]) for leaf in told_by(ts))
 
 
 def told_by(ts: TransitionSystem) -> tuple[str, ...]:
-    """List the leaves of the report by which answers are told apart: the status, and what is enumerated beside it."""
+    """List the leaves that tell answers apart: the status, and the truth values and members beside it."""
     above = ts.links.above
     assert above is not None
     others = [
@@ -275,7 +275,7 @@ class _Followed:
         return Consequence(how, before, report, run, first, shared)
 
     def _comes_to(self, how: How, steps: Sequence[CycleRun]) -> int | None:
-        """Return, if the interpreter's run comes to this, the cycle from which it repeats, 0 for none; else None."""
+        """Return the cycle from which the interpreter's run repeats, 0 for none; None if the run does not come to this."""
         if not broken(self.ts, self.finding.obligation, steps[len(self.steps) - 1]):
             return None
         match how:
@@ -294,7 +294,7 @@ class _Followed:
 
 
 def told(ts: TransitionSystem, consequence: Consequence) -> str:
-    """Say in a sentence what the superior takes."""
+    """Spell in a sentence the report that the superior takes."""
     above = ts.links.above
     assert above is not None
     last, at = consequence.last, f"in cycle {consequence.cycle}"
@@ -319,7 +319,7 @@ def told(ts: TransitionSystem, consequence: Consequence) -> str:
 
 
 def spelled_report(ts: TransitionSystem, report: Report) -> str:
-    """Spell what the superior takes: the status, and the other fields that are not as they begin."""
+    """Spell the report that the superior takes: the status, and the other fields that differ from their initial values."""
     usual = initial(ts.program)
     (_, status), *others = spelled_leaves(ts, report)
     unusual = {leaf for leaf, value in report if value != usual[leaf]}

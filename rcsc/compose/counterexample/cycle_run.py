@@ -48,7 +48,7 @@ class CycleRun:
     Attributes:
         taken: The inputs.
         table: The table that ran last, or the one that ended the cycle; `line`, its line, empty if none matched.
-        fault: What ended the cycle early.
+        fault: The fault that ended the cycle early.
         failed: Assumptions of the table that did not hold, monitored or not.
         before: Every leaf at its start, inputs as last taken.
         after: Every leaf at its end.
@@ -113,7 +113,7 @@ class Halfway:
         settled: Every leaf before the preprocess; `done`, before the postprocess, as far as it came.
         matched: Whether it came to the last table.
         acted: Whether its line, if one ran, was done.
-        seen: What each table that it came to before the last saw, in order.
+        seen: The leaves as each table before the last saw them, in order, as far as it came.
         ended: The one of them whose lines, or assumptions, ended the cycle.
     """
 
@@ -213,7 +213,7 @@ def _step(
 
 
 def _staged(ts: TransitionSystem, step: CycleRun) -> CycleRun:
-    """Tell the tables of a cycle apart: each with what failed where it ran."""
+    """Split a cycle into its tables, each with the assumptions that failed where it ran."""
     if step.fault is Fault.ADMIT:
         return replace(step, failed=())
     half = halfway(ts, step)
@@ -255,7 +255,7 @@ def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
 
 
 def as_declared(ts: TransitionSystem, step: CycleRun) -> bool:
-    """Return whether all that is trusted of what stands outside held where the tables ran: the search may have left it open."""
+    """Return whether all trusted assumptions held where the tables ran: the search may have left that open."""
     failed = {*step.failed, *(name for stage in step.stages for name in stage.failed)}
     return not failed & ts.trusted
 

@@ -41,13 +41,13 @@ class Explanation:
         helps: Suggested repairs of the table, each with whether it is proved of the text that it makes.
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
-        in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
+        in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give a result that no C function can.
         supposed: A cycle that would break it, from a state that the proof does not exclude and nobody has seen reached; None where
             there is a finding, or none was looked for.
-        together: What the first repairs of all findings of its table do together, at the last of them.
-        follows: What comes of it, each with a run that the executors repeated, too; None if that was not looked for.
+        together: The effect of the first repairs of all findings of its table together, at the last of them.
+        follows: Its consequences, each with a run that the executors repeated, too; None if they were not looked for.
         supposes: Of a run of one level alone: for each other level, the inputs for which it gives values that are supposed of it.
-        notes: What is known of it without a run: what may go on for ever, or that the values after a restart break it.
+        notes: Facts known of it without a run: lines that may go on for ever, or values after a restart that break it.
         undefined: Whether the run that was found meets an operation that is not defined.
         gave_up: Whether the solver gave up on a search for a run, so that there may be one among those that were looked at.
     """
@@ -82,7 +82,7 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class TraceSettings:
-    """How to look for runs.
+    """Settings of the search for runs.
 
     Attributes:
         system: The system's description.
@@ -168,7 +168,7 @@ def _level(
 
 
 def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]:
-    """Say that the values at first, or after a restart, break an invariant, or give an order a number that another had."""
+    """Yield notes where initial or restart values break an invariant, or may give an order a number that was used before."""
     for below in ts.links.below:
         if (obligation.sort, obligation.name) == (Sort.NEXT_NUMBER, below.order) and not counts_on(ts, below):
             yield f"after a restart `{below.number}` may be the number of an earlier order: it does not count on from that"
@@ -180,7 +180,7 @@ def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]
 def _supposing(
     systems: Mapping[str, TransitionSystem], explanation: Explanation, system: Description
 ) -> Explanation:
-    """Add what the run of one level alone supposes of the others."""
+    """Add the values of other levels that the run of one level supposes."""
     if explanation.finding is None:
         return explanation
     return replace(explanation, supposes=supposed(system, systems, explanation.finding))
@@ -197,7 +197,7 @@ def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -
 def _searched(
     ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings, gave_up: set[ObligationKey]
 ) -> dict[ObligationKey, TraceResult]:
-    """Run the searches one after the other, each for what is still open."""
+    """Run the searches one after the other, each for the obligations still open."""
     results: dict[ObligationKey, TraceResult] = {}
     for search in settings.searches(str(ts.level.name)):
         left = [obligation for obligation in asked if obligation.key not in results]
@@ -230,7 +230,7 @@ def _with_repairs(
     settings: TraceSettings,
     texts: Texts,
 ) -> Iterator[Explanation]:
-    """Add what would part the lines, tried; the last says what the repairs of all do together."""
+    """Add repairs that part the lines, each tried; the last explanation tells the effect of all of them together."""
     findings = [explanation.finding for explanation in every if explanation.finding is not None]
     if not findings or settings.altered:  # cells of a variant are not what is written
         yield from every
@@ -349,7 +349,7 @@ class _Rerun:
         return replace(explanation, helps=suggested, log=path, in_c=in_c, follows=follows)
 
     def _follows(self, finding: Finding) -> tuple[Consequence, ...] | None:
-        """Find what comes of a finding of one level that has a superior."""
+        """Find the consequences of a finding of one level that has a superior."""
         ts = self.systems[finding.level]
         if not self.settings.further or ts.links.above is None or len(finding.levels) > 1:
             return None

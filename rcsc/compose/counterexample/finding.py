@@ -23,7 +23,7 @@ class Finding:
         level: The level that owes the obligation.
         obligation: The obligation.
         ticks: For each tick the cycle of each level that ran in it, from the top down.
-        after: How many ticks follow the one in which it is broken, to show what comes of it.
+        after: How many ticks follow the one in which it is broken, to show its consequence.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around keep to more than the contract (`TraceSearch.legal`).
         lasso: The cycle, from 1, before which all is as at the end, so that it may go on for ever; 0 if it is no lasso.
@@ -58,7 +58,7 @@ class Finding:
 
 
 def supposed(system: Description, levels: Container[str], finding: Finding) -> dict[str, tuple[str, ...]]:
-    """Return what a run of one level alone supposes of other levels: whose outputs, as which inputs, take other values than at first.
+    """Return, by other level, the inputs for which a run of one level alone supposes new values.
 
     Nothing where levels ran together: then each gave what the others took.
     """
@@ -106,7 +106,7 @@ class TimeLineRow:
         line: The line that ran; all that matched if several did, `none` if none did; before the first `RESTART` or `BEGINS`.
         takes: The inputs that changed, and their values.
         leaves: The other leaves that the cycle changed.
-        wrong: What went wrong in it, or empty.
+        wrong: The fault or broken obligation in it; empty for none.
         before: Table and line of each that ran before in the cycle.
     """
 
@@ -155,7 +155,7 @@ def beginnings(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[
 
 
 def _begun(ts: TransitionSystem, step: CycleRun, *, restarted: bool) -> TimeLineRow:
-    """Return what is not as it is initially, and of a restart what the table of the first cycle reads."""
+    """Return the row before the first cycle: leaves that are not initial, and after a restart those that the first table reads."""
     usual = initial(ts.program)
     tested = {str(name) for name in ts.table(step.table).variables if restarted}
     begins = {
@@ -169,7 +169,7 @@ def _begun(ts: TransitionSystem, step: CycleRun, *, restarted: bool) -> TimeLine
 
 
 def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:
-    """Return the row of one cycle, without what does not change."""
+    """Return the row of one cycle, with only the leaves that change."""
     kinds = ts.kinds
     changed = {
         name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
@@ -199,7 +199,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
 
 
 def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
-    """Spell what extern procedures give, call by call; refused values have no words of their type."""
+    """Spell the results of extern procedures, call by call; refused values have no words of their type."""
     for procedure, given in step.answers:
         writes = next(declared.writes for declared in ts.program.procedures if declared.name == procedure)
         for leaf, value in zip(writes, given, strict=True):

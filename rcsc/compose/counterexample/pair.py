@@ -67,7 +67,7 @@ def broken_together(
     search: TraceSearch,
     begins: Starts = MappingProxyType({}),
 ) -> Finding | NotReproducedError | None:
-    """Return the first of `followed_together`, without what follows it."""
+    """Return the finding of `followed_together`, without its consequences."""
     return followed_together(upper, lower, below, search, begins)[0]
 
 
@@ -79,11 +79,11 @@ def followed_together(
     begins: Starts = MappingProxyType({}),
     further: int = 0,
 ) -> tuple[Finding | NotReproducedError | None, tuple[Consequence, ...]]:
-    """Find the shortest run of both levels in which one breaks what the other assumes; None if none is found.
+    """Find the shortest run of both levels in which one breaks an assumption of the other; None if none is found.
 
     That is: the lower level takes another order under the number that it took last, or a report misstates the last order of the upper
-    one, within `search.most` ticks. `begins` has, for each level, what begins with other values than the initial ones. Also find the
-    shortest runs, up to `further` ticks longer, after which the superior of the upper level takes an answer to the command that stands.
+    one, within `search.most` ticks. `begins` has, for each level, the leaves that begin with other values than the initial ones. Also
+    find the shortest runs, up to `further` ticks longer, after which the superior of the upper level takes an answer to its command.
     """
     pair = _Together(upper, lower, below, begins)
     finding: Finding | NotReproducedError | None = None
@@ -234,7 +234,7 @@ class _Together:
             results.append(result_)
 
     def _answer(self, finding: Finding, ticks: tuple[dict[str, CycleRun], ...]) -> Consequence | None:
-        """Return what comes of a run; None if the interpreter does not answer, or does not break the obligation."""
+        """Return the consequence of a run; None if the interpreter does not answer, or does not break the obligation."""
         name, at = self.sides[0].name, finding.broken_at - 1
         ts = self.upper if finding.level == name else self.lower
         step = ticks[-1].get(name)

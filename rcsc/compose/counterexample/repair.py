@@ -55,7 +55,7 @@ def helps(ts: TransitionSystem, finding: Finding, texts: Texts | None = None) ->
 
 
 def _pauses(ts: TransitionSystem, order: str) -> Iterator[str]:
-    """Say which commands are taken for PAUSE, as the mistake may be their place."""
+    """Yield which commands are taken for PAUSE, as their place may be the mistake."""
     below = next((one for one in ts.links.below if one.order == order), None)
     kind = None if below is None else ts.kinds[below.command]
     if below is not None and isinstance(kind, Enum):
@@ -104,7 +104,7 @@ def _suggested(ts: TransitionSystem, table: Table, step: CycleRun, texts: Texts)
 
 
 def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], texts: Texts) -> str:
-    """Say what the first cell does that is proved in the text, else the first that may be right; empty where all fail."""
+    """Spell the first cell that is proved in the text, else the first whose proof stays open; "" where all fail."""
     text, open_ = texts.of(ts, str(table.name)), ""
     for cell in cells_[: 2 * MOST_TRIED]:
         after = text.parted(cell)
@@ -120,10 +120,10 @@ def _told(ts: TransitionSystem, table: Table, cells_: Sequence[PartingCell], tex
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What cells that part lines do else in runs.
+    """Effects in runs of cells that part lines, besides the parting.
 
     Attributes:
-        breaks: What they break, in words.
+        breaks: The broken obligations and other harm, in words.
         rank: The less, the better: obligations broken and answers revoked; reasons changed and inputs that fall to DEFAULT; keys lost.
     """
 
@@ -131,7 +131,7 @@ class Tried:
     rank: tuple[int, int, int]
 
     def outcome(self, most: int) -> str:
-        """Say what they break in runs of up to `most` cycles."""
+        """Say what the cells break in runs of up to `most` cycles."""
         return (
             f"but {'; '.join(self.breaks)}"
             if self.breaks
@@ -141,11 +141,11 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class Repairs:
-    """What parts the lines of one table that both match in some run.
+    """Repairs that part the lines of one table that both match in some run.
 
     Attributes:
         helps: For each finding its repairs in words, the best first.
-        together: What the best of all findings do together, in words; empty for fewer than two.
+        together: The effect of the best of all findings together, in words; empty for fewer than two.
     """
 
     helps: tuple[tuple[str, ...], ...]
@@ -159,14 +159,14 @@ def repairs(
     most: int,
     texts: Texts | None = None,
 ) -> Repairs:
-    """Try what parts the two lines of each finding of one table, alone and together.
+    """Try cells that part the two lines of each finding of one table, alone and together.
 
     Args:
         ts: The level.
         findings: Runs in which two lines of the table match.
         kept: Obligations that are proved, and should stay so.
         most: The most cycles of a run.
-        texts: What was read of the tables' texts; None for nothing yet.
+        texts: The tables' texts, as far as they were read; None for nothing yet.
     """
     texts, shown, best = texts or Texts(), list[tuple[str, ...]](), list[PartingCell]()
     trials = _Trials(ts, ts.table(findings[0].broken.table), kept, most, texts)
@@ -183,7 +183,7 @@ def repairs(
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
-    """One cell, what is said of it, and what it breaks."""
+    """One cell, the help that proposes it, and the obligations it breaks."""
 
     cell: PartingCell
     said: str
@@ -207,7 +207,7 @@ class _Trials:
     texts: Texts
 
     def ranked(self, finding: Finding) -> list[_Trial]:
-        """Try what parts the lines of a finding, until one is proved and breaks nothing; return those that may be right, the best first."""
+        """Try cells that part a finding's lines, until one is proved and breaks nothing; return those that do not fail, the best first."""
         text, so_far = self.texts.of(self.ts, str(self.table.name)), list[_Trial]()
         for cell in self._parting(finding):
             after = text.parted(cell)
@@ -229,7 +229,7 @@ class _Trials:
         return tuple(cell for cell in every if cell in tries)
 
     def _tried(self, cell: PartingCell, after: After) -> _Trial:
-        """Say what comes of a cell; what cannot be run is only said to be proved, or not."""
+        """Try a cell in runs; where it cannot be run, tell only whether it is proved."""
         said, unproved = after.told(cell.told(self.table)), int(after.outcome is not Outcome.HOLDS)
         if after.ts is None:
             return _Trial(cell, said, (), (unproved, 1, 0, cell.lost))
@@ -237,7 +237,7 @@ class _Trials:
         return _Trial(cell, f"{said}; {trial.outcome(self.most)}", trial.breaks, (unproved, *trial.rank))
 
     def together(self, best: Sequence[PartingCell]) -> str:
-        """Say what the best of all findings do together; empty for fewer than two, and where no text says that."""
+        """Spell the effect of the best cells of all findings together; "" for fewer than two, and where no text states them."""
         if len(best) < 2:
             return ""
         after = self.texts.of(self.ts, str(self.table.name)).together(best)
@@ -261,7 +261,7 @@ def tried(
     kept: Sequence[Obligation],
     most: int,
 ) -> Tried:
-    """Search runs in which cells of a table do harm, of the level as the text with them means it (`new`)."""
+    """Search runs in which changed cells of a table do harm; `new` is the level as its text with them is read."""
     search = TraceSearch(most, legal=True)
     harms = _Harms(new, table, new.table(table.name), tuple(changed), Unrolled(new, search)).search(most)
     owed = {obligation.key for obligation in obligations(new, new.cycle(new.havoc()))}
@@ -280,7 +280,7 @@ def tried(
 
 
 class Harm(StrEnum):
-    """What another line does in place of the one that ran, besides what is owed."""
+    """Harm that another line does in place of the one that ran, besides broken obligations."""
 
     REVOKED = "revoked"
     REASON = "reason"
@@ -347,7 +347,7 @@ class _Harms:
         return values.both(answered(self.ts, cycle, cycle.before), reason)
 
     def _words(self, harm: Harm, steps: Sequence[CycleRun]) -> str:
-        """Say what the last cycle does; empty if the interpreter does not do so."""
+        """Describe the last cycle; "" if the interpreter does not confirm the harm."""
         last, at = steps[-1], len(steps)
         if harm is Harm.DEFAULT:
             default = self.after.default

@@ -37,10 +37,10 @@ KINDS: tuple[Kind, ...] = ("python", "c")
 
 
 class ExecutorsDifferError(Exception):
-    """An executor does not do what the interpreter did: a bug in rcsc.
+    """An executor differs from the interpreter: a bug in rcsc.
 
     Attributes:
-        beside: Where the two differ, and what each left, a line each.
+        beside: Where the two differ, and the values that each left, a line each.
     """
 
     def __init__(self, beside: tuple[str, ...]) -> None:
@@ -57,7 +57,7 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
     Args:
         programs: The programs.
         folder: Where to write: `python/` and `c/` below it.
-        altered: The programs are not what their tables say, so that all are made by force.
+        altered: Whether the programs differ from their tables, so that all are made by force.
 
     Raises:
         OSError: The folder cannot be written.
@@ -78,7 +78,7 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
 
 
 def told_what_externs_give(program: Program) -> Program:
-    """Replace the program's extern procedures by those of `run.answers`: no finding calls the user's functions."""
+    """Replace the program's extern procedures by stand-ins of `run.answers`: no finding calls the user's functions."""
     return replace(
         program,
         procedures=tuple(
@@ -110,7 +110,7 @@ def _stand_ins(program: Program) -> Iterator[str]:
 
 
 def only_in_python(finding: Finding, systems: Mapping[str, TransitionSystem]) -> bool:
-    """Return whether an extern procedure gives what no C function can: a refused value within C's own type."""
+    """Return whether an extern procedure gives a result that no C function can: a refused value within C's own type."""
     for steps in finding.ticks:
         for name, step in steps.items():
             program = systems[name].program
@@ -135,14 +135,14 @@ def record(
     *,
     altered: bool = False,
 ) -> None:
-    """Run a finding on the executors in `system.generated`, both kinds, and write what they do as a log.
+    """Run a finding on the executors in `system.generated`, both kinds, and write the run as a log.
 
     Args:
         finding: The run.
         systems: The levels in it.
         system: Their system.
         path: Where the log goes; None for no log.
-        altered: The programs are not what their tables say; the log says so.
+        altered: Whether the programs differ from their tables; the log says so.
 
     Raises:
         ExecutorsDifferError: They do something else than the interpreter did.
@@ -253,7 +253,7 @@ def _cycles(
 
 
 def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: CycleRun) -> None:
-    """Publish and take what the environment gave in this cycle."""
+    """Publish and take the environment's values of this cycle."""
     for wire in running.description.wires:
         owner, _, variable = wire.target.partition(".")
         if owner == level.name:

@@ -111,7 +111,7 @@ class Simplest:
         ]
 
     def answers(self, program: Program, cycle: Cycle) -> tuple[ExternAnswer, ...]:
-        """Fix what extern procedures give in the cycle: least values, refused ones only if necessary."""
+        """Fix the results of extern procedures in the cycle: least values, refused ones only if necessary."""
         for call in cycle.calls:
             self.run.literal(call.path)
         return tuple(self._answer(program, call) for call in cycle.calls if self._made(call.path))

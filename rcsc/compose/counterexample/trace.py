@@ -70,7 +70,7 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class TraceSearch:
-    """How to look for traces.
+    """Settings of a search for traces.
 
     Attributes:
         most: The most cycles of a run.
@@ -158,7 +158,7 @@ def stopping(
 
 
 def wrong_in(obligation: Obligation, cycle: Cycle) -> Node:
-    """Return the condition that the cycle breaks the obligation; what it leaves counts only if it does not end early."""
+    """Return the condition that the cycle breaks the obligation; its end state counts only if it does not end early."""
     wrong = values.negation(obligation.holds)
     early = obligation.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
     return wrong if early else values.both(wrong, cycle.goes_on)
@@ -250,7 +250,7 @@ class Unrolled:
         return NotReproducedError(obligation.shown, guessed=self.guessed or self._asks, beside=beside)
 
     def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
-        """Return every leaf before the simplest run that ends so, and what each cycle is given.
+        """Return every leaf before the simplest run that ends so, and the inputs and extern results of each cycle.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -272,7 +272,7 @@ class Unrolled:
         return start, self._simplest(settled, start)
 
     def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
-        """Fix what each cycle is given: an input stays as it was if it can."""
+        """Fix the inputs and extern results of each cycle: an input keeps its value if it can."""
         given: list[Given] = []
         program = self.ts.program
         inputs = self.ts.inputs

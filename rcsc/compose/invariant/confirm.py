@@ -78,7 +78,7 @@ class Confirmation:
         return self._denied[clause]
 
     def known(self, clauses: Sequence[Clause]) -> Solver:
-        """Return a solver with one cycle that starts where the clauses hold; what is asked of it may need more `ranges`."""
+        """Return a solver with one cycle that starts where the clauses hold; further questions may need more `ranges`."""
         held = [self._held(clause) for clause in clauses if not self._cannot_break(clause)]
         contract = self.keyed.term(self.cycle.contract)
         solver = Solver(self.limits, remembers=True)

@@ -97,7 +97,7 @@ class Reached:
 
     @classmethod
     def of(cls, points: Iterable[Valuation]) -> "Reached":
-        """Hold these states."""
+        """Return the set of these states."""
         reached, rows = cls(), list(points)
         reached.many = len(rows)
         for at, column in enumerate(zip(*rows, strict=True)):

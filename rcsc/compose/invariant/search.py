@@ -34,7 +34,7 @@ NamedClause = tuple[tuple[str, int], ...]
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much is spent on a search.
+    """The effort of a search.
 
     Attributes:
         walks: Random walks before the search, each of `cycles` cycles; more if there are many tables (`A_TABLE`).
@@ -137,7 +137,7 @@ def strengthened(
 
 
 def _placed(candidates: Iterable[NamedClause], chosen: Sequence[Predicate]) -> list[Clause]:
-    """Return the candidates of which every predicate is chosen and has such a value."""
+    """Return the candidates whose predicates are all chosen, and have such values."""
     places = {predicate.name: (at, predicate.size) for at, predicate in enumerate(chosen)}
     clauses = []
     for candidate in candidates:

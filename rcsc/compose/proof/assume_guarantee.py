@@ -39,7 +39,7 @@ from rcsc.proof.symbolic.execution import Run
 
 
 def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:
-    """Match what each level assumes of each neighbour with what was proved there (`Promise.holds`)."""
+    """Match each level's assumptions about each neighbour with the claims proved there (`Promise.holds`)."""
     proved = {
         (name, obligation.key)
         for name, proof in proofs.items()
@@ -89,23 +89,23 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 
 def _trusted(ts: TransitionSystem, proof: LevelProof, obligation: Obligation) -> tuple[str, ...]:
-    """List what an obligation trusts that no level is responsible for."""
+    """Return the trusted assumptions of an obligation for which no level is responsible."""
     return admitted(ts) if proof.needs_admission(obligation.key) else ()
 
 
 def admitted(ts: TransitionSystem) -> tuple[str, ...]:
-    """Return the assumptions of a claim that a cycle without inputs, or inputs that none has admitted yet, would break."""
+    """Return the assumptions about admission that a claim needs: some inputs are never refused, or never outside their ranges."""
     said = (_said(ts, ts.refusable, NEVER_REFUSED), _said(ts, ts.clamped, IN_RANGE))
     return tuple(trust for trust in said if trust)
 
 
 def not_for_ever(ts: TransitionSystem) -> str:
-    """Return the assumption of a claim that cycles without inputs only put off."""
+    """Return the assumption that no input is refused for ever: cycles without inputs only put off such a claim."""
     return _said(ts, ts.refusable, NOT_FOR_EVER)
 
 
 def _said(ts: TransitionSystem, inputs: Iterable[str], ends: str) -> str:
-    """Say something of inputs, a record or an array of which several parts are meant once, with its name; nothing of none."""
+    """Spell an assumption about inputs; a record or an array with several of them is named once. Return "" for none."""
     parts: dict[str, list[str]] = {}
     for leaf in inputs:
         parts.setdefault(leaf.partition(".")[0].partition("[")[0], []).append(leaf)
@@ -172,7 +172,7 @@ def _of_ending(ts: TransitionSystem, ending: Ending, *, admitting: bool) -> Clai
 
 
 def promises(systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
-    """List what each level assumes of each neighbour."""
+    """Yield each level's assumptions about each neighbour."""
     for name, ts in systems.items():
         yield from _of_above(name, ts, systems)
         yield from _of_below(name, ts, systems)
@@ -229,7 +229,7 @@ def _of_above(name: str, ts: TransitionSystem, systems: Mapping[str, TransitionS
 
 
 def _of_facts(name: str, ts: TransitionSystem) -> Iterator[Promise]:
-    """List what a level declares of what others write: its buffers begin so, and who writes them owes it."""
+    """Yield the facts that a level declares about others' outputs: its buffers begin so, and who writes them owes it."""
     first = {str(v.name): values.constant(v.type, v.initial) for v in ts.program.variables}
     for fact in ts.links.given:
         yield Promise(

@@ -20,7 +20,7 @@ class Candidates:
 
     Attributes:
         found_of: The digest of the level that they were found of (`content`).
-        lacking: What was not shown of lines and endings there.
+        lacking: The lines and endings that were not shown there.
     """
 
     clauses: tuple[NamedClause, ...] = ()

@@ -37,7 +37,7 @@ TRIES = (64, 64, 16, 16, 4, 1)
 
 
 class NotConfirmedError(Exception):
-    """Z3 did not confirm what the search found: nothing may rest on it."""
+    """Z3 did not confirm the result of the search: nothing may rest on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class LevelProof:
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
-    """Prove a level whose inputs may be refused; what is not proved of it, once more as if none were.
+    """Prove a level whose inputs may be refused; prove the open obligations once more as if none were.
 
     An invariant with refusals is one without: the second search begins with the first one's.
     """
@@ -168,7 +168,7 @@ def _proved_of(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> Lev
 
 
 def _lacking(proof: LevelProof) -> tuple[str, ...]:
-    """Name what is not shown of lines and endings, and what is undecided."""
+    """Name the lines and endings that are not shown, and the obligations that are undecided."""
     seen = proof.context
     return (
         *(f"undecided {owed.key}" for owed, verdict in proof.verdicts if verdict is Verdict.UNDECIDED),

@@ -43,7 +43,7 @@ WEIGHTS = (1, 4)
 
 @dataclass(frozen=True, slots=True)
 class RisingLine:
-    """A line that stops because a counter goes one way, and never back, on what earlier counters of the line leave.
+    """A line that stops because a counter goes one way, and never back, in cycles that leave earlier counters of the line unchanged.
 
     Attributes:
         counter: A number of the level, or a sum of several, as it is read.
@@ -64,10 +64,10 @@ class Turn:
     Attributes:
         before: The leaves before it; `taken`, its inputs; `after`, the leaves after it.
         stays: The condition that the table runs, and the command and the phase stay.
-        orders: That an order is given.
-        unanswered: That the command is not answered.
-        answered: That the last orders are answered.
-        ordered: For the report of each subordinate, that an order is given to that one.
+        orders: The condition that an order is given.
+        unanswered: The condition that the command is not answered.
+        answered: The condition that the last orders are answered.
+        ordered: For the report of each subordinate, the condition that an order is given to that one.
     """
 
     at: TableAt
@@ -86,7 +86,7 @@ class Turn:
         return values.both(self.answered, values.negation(self.orders))
 
     def nodes(self, program: Program) -> list[Node]:
-        """List all that is asked about."""
+        """List all nodes that questions read."""
         asked = [
             self.stays,
             self.orders,
@@ -100,7 +100,7 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class StoppingLines:
-    """Which lines of one table stop.
+    """The lines of one table that stop, and those that may not.
 
     Attributes:
         counted: Lines that stop because of a counter; where one has several, the first that counts comes first.
@@ -184,9 +184,9 @@ def _first_of_each(counted: Sequence[Sequence[RisingLine]]) -> tuple[RisingLine,
 
 
 def fewest(names: tuple[str, ...], enough: Callable[[tuple[str, ...]], bool]) -> tuple[str, ...]:
-    """Leave out names from the first on, as long as the others are enough; all are, and none are not.
+    """Leave out names from the first on, as long as the others are enough; all of them are, and no names at all are not.
 
-    What is asked last of those that are enough is the result, or nothing was.
+    The last question answered with "enough" was about the result, or nothing was asked.
     """
     kept: tuple[str, ...] = ()
     while names:
@@ -197,7 +197,7 @@ def fewest(names: tuple[str, ...], enough: Callable[[tuple[str, ...]], bool]) ->
 
 
 def _read_again(program: Program, turns: tuple[Turn, Turn, Turn]) -> set[str]:
-    """Collect the records of which a question reads what a later cycle takes: that another one stays changes no question."""
+    """Collect the records whose values in a later cycle a question reads; whether any other stays changes no question."""
     nodes = [node for turn in turns for node in turn.nodes(program)]
     read = values.variables(nodes).keys()
     return {

@@ -32,7 +32,7 @@ SOME_LINE, ONE_LINE = "some line matches", "no two lines match"
 
 
 class Known(StrEnum):
-    """What is known of an obligation, a level, or the whole system."""
+    """The state of knowledge about an obligation, a level, or the whole system."""
 
     PROVED = "proved"
     TRUSTED = "assumed"  # the tables declare it, of what comes from outside
@@ -58,7 +58,7 @@ class Verdicts:
 
     @property
     def many(self) -> int:
-        """How many claims are accepted."""
+        """The number of accepted claims."""
         return sum(claim.verdict in ACCEPTED for claim in self.claims.values())
 
 
@@ -73,7 +73,7 @@ class _Filed:
 
 @dataclass(frozen=True, slots=True)
 class _AnyLevel:
-    """That levels were proved at all."""
+    """A mark in the cache that some level was proved."""
 
 
 def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
@@ -144,7 +144,7 @@ class SystemOutline:
 
 @dataclass(frozen=True, slots=True)
 class KnownSystem:
-    """What is known of a system of this content.
+    """The kept verdicts on a system of this content.
 
     Attributes:
         outline: The system.
@@ -157,7 +157,7 @@ class KnownSystem:
     closed: Mapping[Need, Closed] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Closes the claims."""
+        """Close the claims."""
         claims = dict(promise.claim for promise in self.outline.assumed)
         claims |= {
             (level, key): claim for level, kept in self.known.items() for key, claim in kept.claims.items()
@@ -176,7 +176,7 @@ class KnownSystem:
         return Known.UNKNOWN if Known.UNKNOWN in known else Known.PROVED
 
     def _obligation(self, level: str, key: Key) -> Known:
-        """Return what is known of an obligation in its level's environment alone."""
+        """Return the state of an obligation in its level's environment alone."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
@@ -184,7 +184,7 @@ class KnownSystem:
         return Known.PROVED if claim is not None and claim.verdict in ACCEPTED else Known.NOT_PROVED
 
     def of_obligation(self, level: str, key: Key) -> Known:
-        """Return what is known of an obligation over the whole chain of levels."""
+        """Return the state of an obligation over the whole chain of levels."""
         known = self._obligation(level, key)
         if known is not Known.PROVED:
             return known
@@ -193,7 +193,7 @@ class KnownSystem:
         return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
 
     def _given(self, level: str, key: Key) -> Known:
-        """Return what is known of a claim that is accepted while something it rests on is not: conditional, or unknown."""
+        """Return the state of an accepted claim that rests on one that is not accepted: conditional, or unknown."""
         whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
         return Known.CONDITIONAL if whole else Known.UNKNOWN
 
@@ -204,7 +204,7 @@ class KnownSystem:
         return self._closed(level, key).proved
 
     def lacking(self, level: str, key: Key = RUNS) -> tuple[str, ...]:
-        """Spell what a claim lacks of all that it rests on; by default, the claim that all others of the level rest on."""
+        """Spell the claims that a claim rests on and that are not accepted; by default, of the claim on which all of the level rest."""
         return tuple(spelled(need, level, self.closed) for need in self._closed(level, key).lacks)
 
     def trusting(self, level: str, key: Key) -> tuple[str, ...]:
@@ -224,7 +224,7 @@ class KnownSystem:
 
     @property
     def whole(self) -> Known:
-        """Whether the whole system is proved."""
+        """The state of knowledge about the whole system."""
         known = {self.of_level(level.name) for level in self.outline.levels}
         if Known.NOT_PROVED in known or self.broken:
             return Known.NOT_PROVED
@@ -232,7 +232,7 @@ class KnownSystem:
         return next((grade for grade in worst if grade in known), Known.PROVED)
 
     def missing(self, level: str) -> tuple[str, ...]:
-        """Say why a level without open obligations is not wholly proved: what it rests on, and what could not be stated."""
+        """Tell why a level without open obligations is not wholly proved: claims it rests on, and obligations not stated."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return ()
@@ -252,6 +252,6 @@ class KnownSystem:
 
 
 def standing(cache: Cache, outline: SystemOutline) -> KnownSystem:
-    """Return what the cache knows of a system."""
+    """Return the cache's verdicts on a system."""
     kept = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
     return KnownSystem(outline, {name: verdicts for name, verdicts in kept.items() if verdicts is not None})

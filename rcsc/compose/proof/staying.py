@@ -33,7 +33,7 @@ def in_a_row(
     Args:
         ts: The level.
         first: The first of the three.
-        phase: Leaves that each cycle is asked to leave as they were; the next one begins with what the first began with.
+        phase: Leaves that each cycle is asked to leave unchanged; the next one begins with their first values.
         still: The inputs that are the same in all three, as the first takes them.
     """
     row = [first]
@@ -44,7 +44,7 @@ def in_a_row(
 
 
 def _taken(ts: TransitionSystem, before: Leaves, still: Mapping[str, Node], suffix: str) -> Leaves:
-    """Return what a cycle takes that keeps the command: what the superior numbers as it was, all else as it may be."""
+    """Return the inputs of a cycle that keeps the command: numbered fields of the order are unchanged, all others are free."""
     above = ts.links.above
     assert above is not None
     same = {leaf: before[leaf] for leaf in (above.number, *above.numbered)}

@@ -69,7 +69,7 @@ class SystemProof:
 
     @property
     def admitting(self) -> tuple[str, ...]:
-        """What is trusted not to be refused, at all or for ever, by some claim."""
+        """The trusted assumptions, of all claims, that something is not refused, at all or for ever."""
         return tuple(
             sorted({trust for claim in self.closed.values() for trust in claim.trusts if of_refusals(trust)})
         )
@@ -164,7 +164,7 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 
 
 def checked(path: Path, name: str) -> tuple[Program, Safety, Loaded]:
-    """Return the program of a level, why a cycle as nodes is what its executors do, and the files that it was read from.
+    """Return the program of a level, the reason why its cycles as nodes agree with its executors, and the files that it was read from.
 
     The two are the same only if every value stays in its range and every operation is defined. That is shown of the program alone,
     if need be under its invariants, which are obligations here. An assumption needed for it stops the cycle in which it fails.

@@ -62,7 +62,7 @@ Way = tuple[Phase, Phase]
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """Whether the command of one table ends.
+    """The result of asking whether the command of one table ends.
 
     Attributes:
         changes: How often the phase can change after the cycle that takes the command; None if phases or tables may loop.
@@ -83,7 +83,7 @@ class Ending:
 
     @property
     def rounds(self) -> tuple[str, ...]:
-        """What may go on for ever, in words."""
+        """The loops and lines that may go on for ever, in words."""
         lines = ", ".join(f"`{line}`" for line in self.endless)
         again = f"{'line' if len(self.endless) == 1 else 'lines'} {lines} may run for ever"
         return (*(f"it may go round: {loop}" for loop in self.loops), *([again] if lines else []))
@@ -103,7 +103,7 @@ def reports(ts: TransitionSystem) -> bool:
 
 
 def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
-    """Return why reports that answer a command are not recognised."""
+    """Return the reasons why reports that answer a command are not recognised."""
     above = ts.links.above
     if above is None:
         return ()
@@ -134,7 +134,7 @@ def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
 
 
 def _says_more(ts: TransitionSystem, report: str) -> bool:
-    """Return whether a report has fields besides what it echoes and its status."""
+    """Return whether a report has fields besides its echoes and its status."""
     made = {f"{report}.{part}" for part in (ECHO, ECHOED, STATUS)}
     return not made.issuperset(leaves_under(ts.program, report))
 

@@ -98,12 +98,12 @@ class Unchecked:
 
 @dataclass(frozen=True, slots=True)
 class Certified:
-    """What became of the check.
+    """The outcome of the check.
 
     Attributes:
-        problems: Why it is refused; none where nothing is wrong.
-        checked: Names of what was checked, each once.
-        unchecked: What was not: here the certificate has only the prover's word.
+        problems: Reasons to refuse it; none where nothing is wrong.
+        checked: Names of the obligations that were checked, each once.
+        unchecked: Those that were not: for these the certificate has only the prover's word.
         rests_on: Assumptions with their standing, and which of them stop a cycle.
     """
 
@@ -119,7 +119,7 @@ class Certified:
 
 
 def check_certificate(program: Program, certificate: Mapping[str, object]) -> tuple[str, ...]:
-    """Problems of the certificate, and what it leaves unchecked; none when it shows all that `program` owes."""
+    """Return the problems of the certificate, and the obligations it leaves unchecked; none when it shows all that `program` owes."""
     outcome = certify(program, certificate)
     return (*outcome.problems, *(f"not checked: {unchecked.name}" for unchecked in outcome.unchecked))
 
@@ -135,9 +135,9 @@ def certify(
     Args:
         program: As the text says; `Table.stops` is not looked at.
         certificate: As it was read from JSON.
-        ask: Is put what is left.
+        ask: Called with each question that is left.
         stops: By table, the stopping assumptions of the executors in question; the certificate must name the same. None
-            where there are no executors: then what it names is reported.
+            where there are no executors: then those that it names are reported.
     """
     try:
         return _Check(program, certificate, ask, stops).outcome()
@@ -204,7 +204,7 @@ class _Check:
         return Certified(tuple(self.problems), checked, tuple(self.unchecked.values()), tuple(self.rests))
 
     def table(self, table: Table, entry: Mapping[str, Any]) -> None:
-        """Exactly one line matches, and the assumptions do not contradict each other."""
+        """Check that exactly one line matches, and that the assumptions do not contradict each other."""
         checker = TableChecker(self.start, table, entry)
         checker.check()
         check_used(entry)
@@ -225,7 +225,7 @@ class _Check:
             raise RejectedError("it has no assumptions, and values are given for them")
 
     def consistent(self, table: Table, entry: Mapping[str, Any]) -> None:
-        """At the values that the certificate names, every assumption of the table and every invariant holds."""
+        """Check that every assumption of the table and every invariant holds at the values that the certificate names."""
         name = f"table `{table.name}`: its assumptions do not contradict each other"
         given = dict(entry[WITNESS])
         for leaf in self.program.variables:
@@ -247,7 +247,7 @@ class _Check:
         self.checked[name] = None
 
     def settle(self, debt: Debt) -> None:
-        """Settle what one run owes, in the order of the run."""
+        """Settle the obligations of one run, in the order of the run."""
         if debt.too_long:
             name = f"{debt.too_long}: {debt.why}"
             self.unchecked[name] = Unchecked(name, debt.written or self.program.tables[0].span, "")
@@ -291,7 +291,7 @@ class _Check:
 
 
 def _is_value(kind: Scalar, value: object) -> bool:
-    """Whether the value, as JSON gives it, is one of the type."""
+    """Return whether the value, as JSON gives it, belongs to the type."""
     if isinstance(kind, Bool):
         return isinstance(value, bool)
     if isinstance(kind, Real):
@@ -303,13 +303,13 @@ def _is_value(kind: Scalar, value: object) -> bool:
 
 
 def _column(leaf: Term, value: Value) -> Any:
-    """One case of the leaf, as `values_in` takes it."""
+    """Return the leaf's value as an array of one case, for `values_in`."""
     kinds = {BOOL: bool, INT: object, REAL: float, SINGLE: np.float32}
     return np.array([float(value) if leaf.sort in REALS else value], dtype=kinds[leaf.sort])
 
 
 def _stopping(program: Program, entries: Mapping[str, Mapping[str, Any]]) -> Program:
-    """The program whose tables stop where the certificate says.
+    """Return the program with its tables stopping where the certificate says.
 
     Raises:
         RejectedError: A table stops at what is no assumption of its.

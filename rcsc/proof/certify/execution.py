@@ -52,7 +52,7 @@ Pairs: TypeAlias = tuple[tuple[bool, bool], ...]
 
 
 def true_of(op: Logic) -> Pairs:
-    """The pairs of operands of which an operator on truth values is true."""
+    """Return the pairs of operands for which a logic operator is true."""
     match op:
         case Op.AND:
             return ((True, True),)
@@ -95,12 +95,12 @@ class State:
     wrote: dict[str, Term] = field(default_factory=dict)
 
     def copy(self) -> "State":
-        """A state that goes its own way."""
+        """Return an independent copy."""
         return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
 
 
 class Start:
-    """What all runs of a program begin with."""
+    """The values and terms with which all runs of a program begin."""
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -112,7 +112,7 @@ class Start:
         self._conditions: dict[int, tuple[Expr, Term]] = {}
 
     def condition(self, expr: Expr) -> Term:
-        """A condition of the program before a run; what evaluating it owes is owed elsewhere."""
+        """Return a condition evaluated before a run; its own obligations are owed elsewhere."""
         known = self._conditions.get(id(expr))
         if known is None:
             known = self._conditions[id(expr)] = expr, Run(self, "").evaluate(expr)
@@ -123,8 +123,8 @@ class Run:
     """One run.
 
     Attributes:
-        where: What runs, for the names of obligations.
-        cell: Where that is written.
+        where: The name of the run, for the names of obligations.
+        cell: The place in the text of the part that runs.
     """
 
     def __init__(self, start: Start, where: str, cell: Written = NOWHERE) -> None:
@@ -151,16 +151,16 @@ class Run:
     # --- expressions ---
 
     def leaf(self, name: str) -> Term:
-        """The present value of a leaf."""
+        """Return the present value of a leaf."""
         return self.state.leaves.get(name) or self.start.leaves[name]
 
     def any_value(self, name: str, kind: Scalar) -> Term:
-        """A value of which only the type is known."""
+        """Return a fresh value of which only the type is known."""
         self._fresh += 1
         return self.terms.variable(f"{name} ({self._fresh})", kind)
 
     def evaluate(self, expr: Expr) -> Term:
-        """The value of an expression."""
+        """Return the value of an expression."""
         terms = self.terms
         match expr:
             case Literal(value=value, type=kind):
@@ -190,7 +190,7 @@ class Run:
         return self.terms.some(self.terms.make("=", subject, term) for term in constants)
 
     def _truth(self, true: Pairs, first: Expr, second: Expr) -> Term:
-        """The right side is evaluated only where the left does not decide."""
+        """Evaluate a logic operator; its right side counts only where the left does not decide."""
         left, path = self.evaluate(first), self.path
         open_for = [a for a in (True, False) if ((a, True) in true) != ((a, False) in true)]
         if len(open_for) == 1:
@@ -209,7 +209,7 @@ class Run:
         return condition if yes else self.terms.negation(condition)
 
     def index(self, expr: Expr, length: int) -> Term:
-        """An index of an array of this length."""
+        """Evaluate an index of an array of this length; owe that it lies inside."""
         at = self.evaluate(expr)
         self.owe(f"the index lies in 0 .. {length - 1}", self._inside(at, 0, length - 1), expr.span)
         return at
@@ -256,7 +256,7 @@ class Run:
         self.owe(f"{what} stays in its 64 bits", self._inside(value, *ends), written)
 
     def _truncated(self, value: Term, kinds: list[Int], written: Written) -> Term:
-        """The whole number of a double; owed that it fits its 64 bits, which a NaN never does."""
+        """Return the whole number of a double; owe that it fits its 64 bits, which a NaN never does."""
         low, high = _word(kinds)
         make, real = self.terms.make, self.terms.constant
         sort = value.sort
@@ -266,7 +266,7 @@ class Run:
         return make("int", value)
 
     def _operation(self, op: Strict, args: list[Term]) -> Term:
-        """One operator; `a min b` is b where b < a, else a, and `a max b` is b where b > a."""
+        """Return the result of one operator; `a min b` is b where b < a, else a, and `a max b` is b where b > a."""
         make, terms = self.terms.make, self.terms
         match op:
             case Op.NOT:
@@ -322,7 +322,7 @@ class Run:
                     assert_never(statement)
 
     def _stored(self, kind: Scalar, value: Term, what: str, written: Written) -> Term:
-        """The value as a place of this type keeps it."""
+        """Return the value as stored in a place of this type; owe that it fits the range."""
         low, high = ends_of(kind)
         if not isinstance(kind, Int | Real) or (value.op == "constant" and low <= value.low <= high):
             return value
@@ -363,7 +363,7 @@ class Run:
             self._arms([(condition, then)], orelse)
 
     def _arms(self, arms: list[tuple[Term, Sequence[Statement]]], orelse: Sequence[Statement]) -> None:
-        """The first arm whose condition holds, else `orelse`."""
+        """Run the first arm whose condition holds, else `orelse`."""
         if not arms:
             self.execute(orelse)
             return
@@ -426,10 +426,10 @@ class Run:
         self.state.local, self.state.assigned = outer
 
     def stops(self, procedure: Procedure) -> None:
-        """What is owed where a cycle may end because a result of the procedure is refused."""
+        """Owe the invariants of a cycle that ends as a result of the procedure is refused; here none."""
 
     def keeps(self, invariants: Iterable[tuple[str, Expr, frozenset[str]]], when: str = "") -> None:
-        """Owes every invariant that speaks of a leaf which was written."""
+        """Owe every invariant that reads a written leaf."""
         for name, condition, reads in invariants:
             if not reads.isdisjoint(self.state.leaves):
                 after = Run(self.start, "")
@@ -438,5 +438,5 @@ class Run:
 
 
 def _word(kinds: Iterable[Int]) -> tuple[int, int]:
-    """The 64 bits that an operation on these works in: unsigned where none can be negative."""
+    """Return the bounds of the 64 bits in which an operation on these works: unsigned where none can be negative."""
     return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)

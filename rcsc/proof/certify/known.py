@@ -35,7 +35,7 @@ class Known:
         self._spans.clear()
 
     def span(self, term: Term) -> Span:
-        """The span of the term."""
+        """Return the span of the term."""
         for part in parts_first(term, but=self._spans):
             self._spans[part] = self._span_of(part)
             self.work += 1
@@ -61,7 +61,7 @@ class Known:
             self.impossible = self.impossible or met[0] > met[1]
 
     def _told(self, term: Term, yes: bool) -> Facts | None:
-        """What follows for spans where the term is true (or false); None where that cannot be."""
+        """Return the spans that follow where the term is true (or false); None where that is impossible."""
         if term.op == "not":
             return self._told(term.args[0], not yes)
         span = self.span(term) or TRUTHS
@@ -88,7 +88,7 @@ class Known:
         return told
 
     def _any(self, parts: Iterable[Term], yes: bool) -> Facts | None:
-        """What every part that can be says, each by itself."""
+        """Return the spans that follow where at least one part holds; None where none can."""
         several = [told for part in parts if (told := self._told(part, yes)) is not None]
         if not several:
             return None
@@ -119,11 +119,11 @@ class Known:
 def _apart(
     term: Term, span: tuple[Number, Number], other: tuple[Number, Number]
 ) -> Iterable[tuple[Term, tuple[Number, Number]]]:
-    """What a whole number or a truth that is not the other, which has one value, loses at its ends."""
+    """Yield the span of a whole number or a truth without the other's only value, where that is at an end."""
     if other[0] == other[1] and term.sort in (INT, BOOL):
         yield term, (span[0] + (span[0] == other[0]), span[1] - (span[1] == other[0]))
 
 
 def _meet(span: Span, other: tuple[Number, Number]) -> tuple[Number, Number]:
-    """Both; a span with an end is of no NaN."""
+    """Return the intersection; a span with an end holds no NaN."""
     return other if span is None else (max(span[0], other[0]), min(span[1], other[1]))

@@ -49,11 +49,11 @@ from rcsc.proof.certify.values import Term, ends_of, sort_of
 
 @dataclass(frozen=True, slots=True)
 class Debt:
-    """One run: what it owes wherever the hypotheses hold.
+    """One run, with its obligations wherever the hypotheses hold.
 
     Attributes:
-        too_long: The name of what could not be followed to its end; then nothing of it is checked.
-        why: Why it could not.
+        too_long: The name of a run that could not be followed to its end; then nothing of it is checked.
+        why: The reason.
     """
 
     hypotheses: tuple[Term, ...]
@@ -73,7 +73,7 @@ class _Running(Run):
 
 
 class Debts:
-    """Derives what one program owes."""
+    """Derives the obligations of one program."""
 
     def __init__(self, program: Program, start: Start) -> None:
         self.program, self.start, self.terms = program, start, start.terms
@@ -84,7 +84,7 @@ class Debts:
         self.holding = tuple(start.condition(condition) for _, condition, _ in self.invariants)
 
     def all(self) -> Iterator[Debt]:
-        """Every debt."""
+        """Yield every debt."""
         yield self._first()
         if self.program.levels:
             yield self._begun_anew()
@@ -99,7 +99,7 @@ class Debts:
             yield from self._table(table)
 
     def stopping(self, table: Table) -> tuple[Term, ...]:
-        """What holds when the table is matched: invariants and the stopping assumptions."""
+        """Return the conditions that hold when the table is matched: invariants and the stopping assumptions."""
         known = (
             assumption.condition for assumption in self.program.assumptions if assumption.name in table.stops
         )
@@ -122,7 +122,7 @@ class Debts:
         return Debt((), tuple(run.owed))
 
     def _begun_anew(self) -> Debt:
-        """The values after a restart, where they are constants; what is adopted from a buffer is owed of the levels together."""
+        """Owe the invariants after a restart, of constant values alone; values adopted from a buffer are owed of the levels together."""
         adopted = self.program.adopted
         fixed = {leaf: what.value for leaf, what in adopted.items() if isinstance(what, Fixed)}
         run = Run(self.start, "after a restart")
@@ -163,7 +163,7 @@ class Debts:
     # --- what runs outside lines ---
 
     def _deferred(self) -> Debt:
-        """All deferred values whose condition holds are taken at once."""
+        """Run the taking of deferred values: all whose condition holds are taken at once."""
         deferred = [variable for variable in self.program.variables if variable.deferred_until is not None]
         run = Run(self.start, "taking deferred values")
         taken = [
@@ -181,7 +181,7 @@ class Debts:
         return Debt(self.holding, tuple(run.owed))
 
     def _safe_values(self) -> Debt:
-        """After a fault every output that has a safe value shows it; where the cycle ended, the invariants held."""
+        """Run the showing of safe values after a fault; where the cycle ended, the invariants held."""
         run = Run(self.start, "showing safe values after a fault")
         for variable in self.program.variables:
             if variable.safe is not None:
@@ -190,7 +190,7 @@ class Debts:
         return Debt(self.holding, tuple(run.owed))
 
     def _set(self, run: Run, variable: Variable, declared: Value) -> None:
-        """Give a leaf a value that its declaration names; that its type has it is owed."""
+        """Give a leaf a value that its declaration names; owe that its type has it."""
         value = run.state.leaves[variable.name] = self.terms.constant(sort_of(variable.type), declared)
         low, high = ends_of(variable.type)
         if not (low <= value.low and value.high <= high):
@@ -212,7 +212,7 @@ class Debts:
         return Debt(self.holding, tuple(run.owed))
 
     def _uncalled(self) -> Iterator[Debt]:
-        """Procedures that no line and no level runs, for all values of their parameters."""
+        """Yield the debts of procedures that no line and no level runs, for all values of their parameters."""
         reached = {
             str(name) for level in self.program.levels for name in (*level.preprocess, *level.postprocess)
         }
@@ -264,7 +264,7 @@ class Debts:
                 yield self._same(table, meeting)
 
     def _same(self, table: Table, meeting: Meeting) -> Debt:
-        """Both lines are run from one state, and each variable that one of them writes is the same after both."""
+        """Run both lines from one state; owe that each variable that one of them writes is the same after both."""
         lines = {line.name: line for line in table.lines}
         pair = lines[meeting.first], lines[meeting.second]
         where = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}` do the same"
@@ -291,19 +291,19 @@ class Debts:
         return Debt((*self._assumed(table), self.start.condition(meeting.where)), tuple(end.owed))
 
     def _alike(self, run: Run, other: Run) -> Term:
-        """That a run goes well where the other one does."""
+        """Return the term that a run meets its obligations wherever the other one does."""
         paid = [self.terms.follows(owed.path, owed.good) for owed in run.owed]
         given = [self.terms.follows(owed.path, owed.good) for owed in other.owed]
         return self.terms.follows(self.terms.every(given), self.terms.every(paid))
 
     def _calls_extern(self, body: Iterable[Statement]) -> bool:
-        """Whether statements call an extern procedure, or one that does."""
+        """Return whether statements call an extern procedure, directly or not."""
         called = [statement for statement in everything(tuple(body)) if isinstance(statement, Call)]
         procedures = [self.start.procedures[str(call.procedure)] for call in called]
         return any(each.extern is not None or self._calls_extern(each.body) for each in procedures)
 
     def _assumed(self, table: Table) -> tuple[Term, ...]:
-        """What a table relies on: invariants and its assumptions."""
+        """Return the conditions that a table relies on: invariants and its assumptions."""
         known = (each.condition for each in self.program.assumptions if each.name in table.assumptions)
         return (*self.holding, *map(self.start.condition, known))
 
@@ -324,11 +324,11 @@ class Debts:
         return Debt((*stopping, *map(self.terms.negation, others)), tuple(run.owed))
 
     def _tests(self, line: Line) -> list[Term]:
-        """The conditions of the line, as terms."""
+        """Return the conditions of the line as terms."""
         return [self.start.condition(test.condition) for test in line.tests if test is not None]
 
     def _actions(self, run: _Running, actions: Iterable[Action]) -> None:
-        """Left to right; what two of them write gets one value."""
+        """Run the actions left to right; owe that two of them write one value to a variable."""
         wrote: dict[str, Term] = {}
         for action in actions:
             before, run.state.wrote = dict(run.state.leaves), {}
@@ -344,7 +344,7 @@ class Debts:
 
 
 def _at(run: Run) -> Run:
-    """A run in the same state that owes nothing of its own."""
+    """Return a run in the same state, with no obligations of its own."""
     other = Run(run.start, "")
     other.state = run.state
     return other

@@ -40,7 +40,7 @@ _FIT = 2**62
 
 
 class CaseAnswer(Enum):
-    """What a solver says of a question: is there a case in which the obligation fails?"""
+    """A solver's answer to the question: is there a case in which the obligation fails?"""
 
     NONE = auto()
     SOME = auto()
@@ -87,7 +87,7 @@ class Settler:
         self.terms, self.ask, self.first, self.work = terms, ask, first, 0
 
     def settle(self, hypotheses: Sequence[Term], path: Term, good: Term, known: Known) -> Outcome:
-        """Whether `good` holds wherever the path is taken; `known` are the spans on the path."""
+        """Settle whether `good` holds wherever the path is taken; `known` are the spans on the path."""
         before = known.work
         by_spans = known.impossible or known.span(good) == (1, 1)
         self.work += known.work - before
@@ -106,7 +106,7 @@ class Settler:
         return Fails(()) if answer is CaseAnswer.SOME else Left(question)
 
     def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
-        """All values of what the obligation speaks of, and of what hypotheses tie to that while these are few.
+        """Try all values of the obligation's variables, and of those that hypotheses tie to them; None where these are too many.
 
         Hypotheses about other variables are tried afterwards, part by part: a failing case counts only where they can hold.
         """
@@ -132,7 +132,7 @@ class Settler:
             wanted = rest[0]
 
     def _some_cases(self, hypotheses: Sequence[Term], bad: Term) -> Outcome | None:
-        """A case among some in which it fails."""
+        """Try some cases; return one in which the obligation fails, None where none of these does."""
         wrong = self.terms.every((*hypotheses, bad))
         wanted = variables(wrong)
         picked = random.Random(len(wanted))  # noqa: S311 - the same cases in every run
@@ -156,7 +156,7 @@ class Settler:
         )
 
     def _where(self, condition: Term, cases: Cases) -> Any:
-        """Numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
+        """Return the numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
         count = max((len(column) for column in cases.values()), default=1)
         self.work += (1 + count // CASES_A_SPAN) * len(parts_first(condition))
         try:
@@ -169,7 +169,7 @@ class Settler:
 
 
 def _tied(wanted: Term, hypotheses: Sequence[Term], known: Known) -> list[Term] | None:
-    """The hypotheses that are tied to the term, while all cases can be tried; None where there are too many without any."""
+    """Return the hypotheses tied to the term while all cases are few enough to try; None where the term alone has too many."""
     used: list[Term] = []
     leaves = set(variables(wanted))
     if not _few(leaves, known, len(parts_first(wanted))):
@@ -189,7 +189,7 @@ def _tied(wanted: Term, hypotheses: Sequence[Term], known: Known) -> list[Term] 
 
 
 def variables(*terms: Term) -> list[Term]:
-    """The variables below the terms."""
+    """Return the variables in the terms."""
     return [term for term in parts_first(*terms) if term.op == "variable"]
 
 
@@ -198,7 +198,7 @@ def _extent(term: Term, known: Known) -> tuple[Number, Number]:
 
 
 def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
-    """Whether all cases of the variables can be tried."""
+    """Return whether all cases of the variables can be tried."""
     total = size
     for term in wanted:
         low, high = _extent(term, known)
@@ -211,7 +211,7 @@ def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
 
 
 def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
-    """Every combination of the variables' values."""
+    """Return every combination of the variables' values, as one array a variable."""
     axes = []
     for term in wanted:
         low, high = _extent(term, known)
@@ -241,12 +241,12 @@ def _array(sort: str, values: Iterable[Number], *, wide: bool = False) -> Any:
 
 
 def _row(cases: Cases, at: int) -> Iterator[tuple[str, Number]]:
-    """One case: values by the names of variables."""
+    """Return one case: values by the names of variables."""
     return ((term.name, column[at : at + 1].tolist()[0]) for term, column in cases.items())
 
 
 def _edges(term: Term) -> Mapping[str, list[Number]]:
-    """Constants in the term and their neighbours, by sort."""
+    """Return constants in the term and their neighbours, by sort."""
     edges: dict[str, list[Number]] = {
         BOOL: [0, 1],
         INT: [0, 1, -1],
@@ -260,7 +260,7 @@ def _edges(term: Term) -> Mapping[str, list[Number]]:
 
 
 def values_in(wanted: Term, cases: Cases, count: int) -> Any:
-    """The term's value in each case, as an array.
+    """Return the term's value in each case, as an array.
 
     Raises:
         OverflowError: A whole number is too large to become a double.
@@ -285,7 +285,7 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
 
 
 def _computed(term: Term, args: Sequence[Any], wide: bool) -> Any:
-    """One operation in every case."""
+    """Compute one operation in every case."""
     first, last = args[0], args[-1]
     match term.op:
         case "kept":
@@ -321,7 +321,7 @@ _NUMBERS: Mapping[str, Callable[..., Any]] = {
 
 
 def _divided(op: str, dividend: Any, divisor: Any) -> Any:
-    """The quotient toward zero, or what it leaves; 0 where the divisor is 0."""
+    """Return the quotient toward zero, or the remainder; 0 where the divisor is 0."""
     nonzero = np.where(divisor == 0, 1, divisor)
     quotient = abs(dividend) // abs(nonzero)
     quotient = np.where((dividend < 0) == (nonzero < 0), quotient, -quotient)
@@ -343,7 +343,7 @@ _SORTS = {BOOL: "Bool", INT: "Int", REAL: "Float64", SINGLE: "Float32"}
 
 
 def script(conditions: Collection[Term]) -> str:
-    """The conditions over the ranges of their variables: `unsat` says that no case satisfies them all."""
+    """Spell the conditions over the ranges of their variables in SMT-LIB; `unsat` says that no case satisfies them all."""
     lines, names = [_PRELUDE], dict[Term, str]()
     for number, term in enumerate(parts_first(*conditions)):
         sort = _SORTS[term.sort]

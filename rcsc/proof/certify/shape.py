@@ -26,7 +26,7 @@ def check_shape(certificate: Any, program: str) -> None:
         program: The name of the program that it must be of.
 
     Raises:
-        RejectedError: Something is not as it must be; says where.
+        RejectedError: A part is malformed; the message says where.
     """
     if not isinstance(certificate, Mapping) or certificate.get("format") != FORMAT:
         raise RejectedError("not a certificate")
@@ -49,7 +49,7 @@ def _is_table(entry: Any) -> bool:
 
 
 def _entry(entry: Mapping[str, Any]) -> None:
-    """Check what is said of one table."""
+    """Check the entry of one table."""
     where = f"table `{str(entry.get('table'))[:60]}`"
     _fields(entry, _TABLE, frozenset({WITNESS}), where)
     for key in ("assumptions", "columns"):
@@ -65,7 +65,7 @@ def _entry(entry: Mapping[str, Any]) -> None:
 
 
 def check_used(entry: Mapping[str, Any]) -> None:
-    """Check that every column is of a form, and every form of the tree: what is looked at nowhere could be anything.
+    """Check that every column is in a form, and every form in the tree: an unused one could be anything.
 
     Raises:
         RejectedError: One is not.
@@ -81,7 +81,7 @@ def check_used(entry: Mapping[str, Any]) -> None:
 
 
 def _node(forms: int, assumptions: int) -> _Check:
-    """Check a node of a tree over so many forms and assumptions."""
+    """Return a check of a tree's node, over so many forms and assumptions."""
     multipliers = _pairs(forms)
     shapes: dict[str, tuple[_Check, ...]] = {
         "s": (_below(forms), _number), "e": (multipliers,), "a": (_below(assumptions),), "l": (lambda at: _number(at) and at >= -1,),
@@ -100,7 +100,7 @@ def _node(forms: int, assumptions: int) -> _Check:
 
 
 def _pairs(count: int) -> _Check:
-    """Check a list of numbers below a count, ascending, with what is not 0."""
+    """Return a check of a list of pairs: numbers below a count, ascending, each with a nonzero number."""
     below = _below(count)
 
     def pair(value: Any) -> bool:

@@ -71,18 +71,18 @@ class AnyOf:
 
 
 class RejectedError(Exception):
-    """The certificate does not show what it should."""
+    """The certificate does not prove its claim."""
 
 
 class _Terms:
-    """Conditions of the model as formulas over forms; knows the range of every term met."""
+    """Conditions of the model as formulas over forms, and the range of every term met."""
 
     def __init__(self, program: Program) -> None:
         self.range = {str(v.name): key_bounds(v.type) for v in program.variables}
         self.terms: dict[str, Expr] = {str(v.name): Read(v.name, v.type) for v in program.variables}
 
     def span(self, form: Form) -> tuple[int, int]:
-        """Least and greatest value of the form over the declared ranges."""
+        """Return the least and the greatest value of the form over the declared ranges."""
         ends = [sorted((k * self.range[name][0], k * self.range[name][1])) for name, k in form]
         return sum(low for low, _ in ends), sum(high for _, high in ends)
 
@@ -94,7 +94,7 @@ class _Terms:
         return name
 
     def formula(self, expr: Expr, yes: bool = True) -> Formula:
-        """`expr = yes`, negations pushed inward."""
+        """Return the formula of `expr = yes`, with negations pushed inward."""
         match expr:
             case Literal(value=value):
                 return All(()) if bool(value) == yes else AnyOf(())
@@ -114,7 +114,7 @@ class _Terms:
                 return ((self.name(expr), 1),), ((int(yes), int(yes)),)
 
     def truth(self, left: Expr, right: Expr, rows: list[tuple[bool, bool]]) -> Formula:
-        """The formula that the two have one of the pairs of values."""
+        """Return the formula that the two have one of the pairs of values."""
         if len(rows) == 3:
             [(a, b)] = [pair for pair in PAIRS if pair not in rows]
             return AnyOf((self.formula(left, not a), self.formula(right, not b)))
@@ -144,7 +144,7 @@ class _Terms:
         return form, inside if yes else _complement(inside, low, high)
 
     def add(self, total: dict[str, int], expr: Expr, factor: int) -> int:
-        """Add `factor * expr` to the total; the constant part is returned."""
+        """Add `factor * expr` to the total; return the constant part."""
         match expr:
             case Literal(value=value, type=kind):
                 return factor * key_of(kind, value)
@@ -167,7 +167,7 @@ class _Terms:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """A line in a region: the boxes and other formulas that are still open; none: it holds."""
+    """A line in a region: the boxes and other formulas that are still open; with none, it holds."""
 
     index: int
     boxes: dict[Form, Box]
@@ -179,7 +179,7 @@ class TableChecker:
 
     Attributes:
         names: The assumptions that the tree may use.
-        questions: What the tree leaves to be settled.
+        questions: The questions that the tree leaves to be settled.
     """
 
     def __init__(self, start: Start, table: Table, entry: Mapping[str, Any]) -> None:
@@ -204,7 +204,7 @@ class TableChecker:
         self.questions: list[Debt] = []
 
     def condition(self, expr: Expr) -> Formula:
-        """A condition as a formula; of one leaf, as far as can be, the keys for which it holds."""
+        """Return a condition as a formula; one about a single leaf becomes, if possible, the keys for which it holds."""
         formula = self.terms.formula(expr)
         names = set(map(str, read_by(expr)))
         if len(names) != 1:
@@ -214,7 +214,7 @@ class TableChecker:
         return formula if box is None else (((name, 1),), box)
 
     def tried(self, expr: Expr, name: str) -> Box | None:
-        """The keys for which the condition holds, each tried; None where there are many, or it is undefined for one."""
+        """Try each key of the leaf; return those for which the condition holds. None for many keys, or where it is undefined for one."""
         low, high = self.terms.range[name]
         leaf = self.start.leaves[name]
         if high - low >= SMALL or leaf.sort in REALS:
@@ -230,7 +230,7 @@ class TableChecker:
         return _union(iter([((int(key), int(key)),) for key in holding]))
 
     def read_form(self, terms: list[tuple[str, int]]) -> tuple[Form, int]:
-        """The canonical form, and -1 where the certificate has it with the opposite sign."""
+        """Return the canonical form, and -1 where the certificate has it with the opposite sign."""
         terms.sort()
         sign = 1 if terms[0][1] > 0 else -1
         form = tuple((name, sign * k) for name, k in terms)
@@ -243,11 +243,11 @@ class TableChecker:
         return form, sign
 
     def range(self, form: Form, bounds: Bounds) -> tuple[int, int]:
-        """The form's bounds in a region."""
+        """Return the form's bounds in a region."""
         return bounds.get(form) or self.terms.span(form)
 
     def judge(self, formula: Formula, bounds: Bounds) -> Formula:
-        """What is left of the formula within the bounds; `All(())` and `AnyOf(())` are true and false."""
+        """Simplify the formula within the bounds; `All(())` and `AnyOf(())` are true and false."""
         if isinstance(formula, tuple):
             form, box = formula
             low, high = self.range(form, bounds)
@@ -274,7 +274,7 @@ class TableChecker:
         return parts[0] if len(parts) == 1 else kind(tuple(parts))
 
     def line(self, index: int, parts: Iterator[Formula]) -> _Line | None:
-        """The conjunction of judged formulas; None when it is false."""
+        """Return the conjunction of judged formulas; None when it is false."""
         boxes: dict[Form, Box] = {}
         rest: list[Formula] = []
         for whole in parts:
@@ -286,7 +286,7 @@ class TableChecker:
         return None if AnyOf(()) in rest or not all(boxes.values()) else _Line(index, boxes, tuple(rest))
 
     def within(self, line: _Line, form: Form, bounds: Bounds) -> _Line | None:
-        """The line in a region whose bounds on `form` have narrowed."""
+        """Return the line in a region whose bounds on `form` have narrowed; None where it cannot hold there."""
         if form not in line.boxes and not line.rest:
             return line
         kept = [(other, box) for other, box in line.boxes.items() if other != form]
@@ -296,7 +296,7 @@ class TableChecker:
         )
 
     def check(self) -> None:
-        """Every node, in preorder.
+        """Check every node, in preorder.
 
         Raises:
             RejectedError: A node does not hold, or the tree is not that of all inputs.
@@ -316,7 +316,7 @@ class TableChecker:
     def split(
         self, bounds: Bounds, lines: list[_Line], number: int, cut: int
     ) -> list[tuple[Bounds, list[_Line]]]:
-        """The two parts of a region, the first on top of the stack."""
+        """Return the two parts of a region, the first on top of the stack."""
         form, sign = self.forms[number]
         low, high = self.range(form, bounds)
         first, second = ((low, cut), (cut + 1, high)) if sign > 0 else ((-cut, high), (low, -cut - 1))
@@ -331,7 +331,7 @@ class TableChecker:
         return sides
 
     def leaf(self, bounds: Bounds, lines: list[_Line], kind: str, *rest: Any) -> bool:
-        """Whether exactly one line (with DEFAULT: at most one) holds all over the region."""
+        """Return whether exactly one line (with DEFAULT: at most one) holds all over the region."""
         if kind == "a":
             return (
                 type(rest[0]) is int
@@ -349,7 +349,7 @@ class TableChecker:
         return kind == "z" and self.left(bounds, [line.index for line in lines])
 
     def left(self, bounds: Bounds, candidates: list[int]) -> bool:
-        """Hands on that exactly one of the candidates holds in the region; whether it can be said."""
+        """Leave the question whether exactly one candidate holds in the region to be settled; return whether it could be stated."""
         if len(candidates) > MOST_PAIRED:
             return False
         terms, condition = self.start.terms, self.start.condition
@@ -369,7 +369,7 @@ class TableChecker:
         return True
 
     def within_bounds(self, form: Form, low: int, high: int) -> list[Term]:
-        """`low <= form <= high` as far as terms say it; of the distance of two doubles only which is greater."""
+        """Return `low <= form <= high` as far as terms can state it; for the distance of two doubles, only which is greater."""
         make, terms = self.start.terms.make, self.start.terms
         parts = [(self.start.condition(self.terms.terms[name]), k) for name, k in form]
         sort = parts[0][0].sort
@@ -403,7 +403,7 @@ class TableChecker:
         return [make("<=", terms.constant(INT, low), total), make("<=", total, terms.constant(INT, high))]
 
     def is_empty(self, bounds: Bounds, multipliers: list[list[int]]) -> bool:
-        """Whether the bounds, times the multipliers, add up to 0 <= a negative number."""
+        """Return whether the bounds, times the multipliers, add up to 0 <= a negative number."""
         total: dict[str, int] = {}
         bound = 0
         for number, k in multipliers:
@@ -417,7 +417,7 @@ class TableChecker:
         return bound < 0 and not any(total.values())
 
     def counts(self, bounds: Bounds, lines: list[_Line], count: int | None, parts: list[int] | None) -> bool:
-        """Whether the lines are disjoint boxes and, where they must, fill the region."""
+        """Return whether the lines are disjoint boxes and, where they must, fill the region."""
         forms = sorted({form for line in lines for form in line.boxes})
         if any(line.rest for line in lines) or any(len(form) > 1 for form in forms):
             return False
@@ -439,7 +439,7 @@ class TableChecker:
 
 
 def _disjoint(lines: list[dict[Form, Box]], forms: list[Form]) -> Iterator[bool]:
-    """For each line, whether every later line is parted from it by some form."""
+    """Yield for each line whether some form parts every later line from it."""
     owner: dict[Form, Any] = {}  # for each line the number of its box, 0 where it has none
     ends: dict[Form, tuple[Any, Any, Any]] = {}  # low and high rank of every interval; where each box starts
     rank: dict[Form, dict[int, int]] = {}
@@ -471,7 +471,7 @@ def _disjoint(lines: list[dict[Form, Box]], forms: list[Form]) -> Iterator[bool]
 
 
 def _one_form(formula: Formula, form: Form, ends: tuple[int, int]) -> Box | None:
-    """The keys for which a formula about one form holds; None where it speaks of another."""
+    """Return the keys for which a formula about one form holds; None where it speaks of another."""
     if isinstance(formula, tuple):
         return formula[1] if formula[0] == form else None
     box: Box = (ends,) if isinstance(formula, All) else ()
@@ -488,7 +488,7 @@ def _plain(expr: Expr) -> bool:
 
 
 def _ordered(expr: Expr) -> bool:
-    """Whether keys order the values: no infinity or NaN can be among them."""
+    """Return whether keys order the values: no infinity or NaN can be among them."""
     return not isinstance(expr.type, Real) or abs(expr.type.low) + abs(expr.type.high) < float("inf")
 
 
@@ -505,13 +505,13 @@ def _size(box: Box) -> int:
 
 
 def _complement(box: Box, low: int, high: int) -> Box:
-    """What of `low .. high` is not in the box (sorted, disjoint)."""
+    """Return the part of `low .. high` outside the box (sorted, disjoint)."""
     edges = [low - 1, *(end for pair in box for end in pair), high + 1]
     return tuple((a + 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if a + 1 <= b - 1)
 
 
 def _union(boxes: Iterator[Box]) -> Box:
-    """The intervals of all boxes, sorted, those that overlap or touch joined."""
+    """Return the intervals of all boxes, sorted; those that overlap or touch are joined."""
     intervals: list[tuple[int, int]] = []
     for low, high in sorted(pair for box in boxes for pair in box):
         if intervals and low <= intervals[-1][1] + 1:

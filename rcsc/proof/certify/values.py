@@ -48,19 +48,19 @@ class Term:
 
 
 def sort_of(kind: Scalar) -> str:
-    """The sort of the type's values."""
+    """Return the sort of the type's values."""
     if isinstance(kind, Real):
         return SINGLE if isinstance(kind, Single) else REAL
     return BOOL if isinstance(kind, Bool) else INT
 
 
 def ends_of(kind: Scalar) -> tuple[Number, Number]:
-    """Least and greatest value of the type, truths and members as integers."""
+    """Return the least and the greatest value of the type, truths and members as integers."""
     return (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
 
 
 def nearest_single(value: Number) -> float:
-    """The nearest binary32, ties to even: of a double by the machine's rounding, of a whole number by its 24 leading digits."""
+    """Return the nearest binary32, ties to even: of a double by the machine's rounding, of a whole number by its 24 leading digits."""
     if isinstance(value, float):
         with np.errstate(over="ignore"):  # an infinity
             return float(np.float32(value))
@@ -84,20 +84,20 @@ class Terms:
         return self._known.setdefault(key, term)
 
     def constant(self, sort: str, value: Value) -> Term:
-        """A constant."""
+        """Return a constant of the sort."""
         point = float(value) if sort in REALS else int(value)
         return self._interned(Term("constant", (), sort, point, point))
 
     def variable(self, name: str, kind: Scalar) -> Term:
-        """Any value of the type."""
+        """Return a variable: any value of the type."""
         return self._interned(Term("variable", (), sort_of(kind), *ends_of(kind), name))
 
     def kept(self, inner: Term, low: Number, high: Number, debt: int) -> Term:
-        """The value, where obligation `debt` holds: then it lies in `low .. high`."""
+        """Return the value where obligation `debt` holds: then it lies in `low .. high`."""
         return self._interned(Term("kept", (inner,), inner.sort, low, high, debt=debt))
 
     def make(self, op: str, *args: Term) -> Term:
-        """An operation on numbers, or a comparison."""
+        """Return an operation on numbers, or a comparison; one on constants is computed."""
         sort = (
             BOOL
             if op in ("=", "<", "<=")
@@ -111,17 +111,17 @@ class Terms:
         return self._interned(term)
 
     def negation(self, term: Term) -> Term:
-        """The opposite of a term."""
+        """Return the negation of a term."""
         if term.op == "constant":
             return self.false if term.low else self.true
         return term.args[0] if term.op == "not" else self._interned(Term("not", (term,), BOOL))
 
     def every(self, parts: Iterable[Term]) -> Term:
-        """That all parts hold."""
+        """Return the term that all parts hold."""
         return self._joined("and", parts, self.true, self.false)
 
     def some(self, parts: Iterable[Term]) -> Term:
-        """That some part holds."""
+        """Return the term that some part holds."""
         return self._joined("or", parts, self.false, self.true)
 
     def _joined(self, op: str, parts: Iterable[Term], neutral: Term, final: Term) -> Term:
@@ -134,11 +134,11 @@ class Terms:
         return kept[0] if len(kept) == 1 else self._interned(Term(op, kept, BOOL)) if kept else neutral
 
     def follows(self, premise: Term, conclusion: Term) -> Term:
-        """The conclusion wherever the premise."""
+        """Return the term that the premise implies the conclusion."""
         return self.some((self.negation(premise), conclusion))
 
     def choice(self, condition: Term, then: Term, orelse: Term) -> Term:
-        """`then` where the condition holds, else `orelse`."""
+        """Return `then` where the condition holds, else `orelse`."""
         if condition.op == "constant":
             return then if condition.low else orelse
         return then if then is orelse else self._interned(Term("ite", (condition, then, orelse), then.sort))
@@ -148,7 +148,7 @@ class Terms:
 
 
 def spanned(term: Term, spans: Sequence[Span]) -> Span:
-    """The span of a term by those of its parts."""
+    """Return the span of a term, computed from those of its parts."""
     if term.op in ("constant", "variable"):
         return None if isinstance(term.low, float) and math.isnan(term.low) else (term.low, term.high)
     if term.op in ("not", "and", "or"):
@@ -178,7 +178,7 @@ def _logic(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 
 
 def _chosen(term: Term, spans: Sequence[Span]) -> Span:
-    """The span of both sides, each as the condition narrows it; None only where one may be a NaN."""
+    """Return the span of both sides, each as the condition narrows it; None only where one may be a NaN."""
     condition = spans[0] or TRUTHS
     if condition[0] == condition[1]:
         return spans[1] if condition[0] else spans[2]
@@ -198,7 +198,7 @@ def _beside(
     spans: Sequence[Span],
     yes: bool,
 ) -> tuple[Number, Number]:
-    """The span of a side that the condition itself compares with the other side, or with a constant: least and greatest."""
+    """Narrow the span of a side that the condition compares with the other side, or with a constant."""
     if condition.op not in ("<", "<=") or side not in condition.args:
         return span
     at = condition.args.index(side)
@@ -231,7 +231,7 @@ def _compared(
 
 
 def truncated(a: int, b: int) -> int:
-    """The quotient toward zero; 0 where the divisor is 0."""
+    """Return the quotient rounded toward zero; 0 where the divisor is 0."""
     quotient = abs(a) // abs(b) if b else 0
     return quotient if (a < 0) == (b < 0) else -quotient
 
@@ -284,7 +284,7 @@ def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 
 
 def parts_first(*terms: Term, but: Container[Term] = ()) -> list[Term]:
-    """Every term once, parts before wholes, `but` these and what is only below them; without recursion, since runs are long."""
+    """Return every term once, parts before wholes, without `but` and the terms only below these. It does not recurse, as runs are long."""
     ordered: list[Term] = []
     seen: set[Term] = set()
     stack = [(term, False) for term in reversed(terms)]

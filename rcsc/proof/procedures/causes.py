@@ -32,7 +32,7 @@ _HELP: dict[Code, tuple[str, ...]] = {
 
 @dataclass(slots=True)
 class Cause:
-    """One place and what can go wrong there, in every context where it can; told `there` where that is another place."""
+    """One place and what can go wrong there, in every context where it can; reported at `there`, if set."""
 
     failures: list[Failure] = field(default_factory=list)
     where: list[tuple[str, str]] = field(default_factory=list)  # note, table
@@ -40,7 +40,7 @@ class Cause:
 
 
 def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
-    """One cause as it is reported."""
+    """Return one cause as a diagnostic."""
     span = cause.there or span
     failing = [
         (failure, place)

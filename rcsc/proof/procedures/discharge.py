@@ -40,7 +40,7 @@ class Tally:
 
 
 class Discharge(Enum):
-    """What became of an obligation that is not shown."""
+    """The outcome of an obligation that is not shown."""
 
     FAILS = auto()
     OPEN = auto()
@@ -81,7 +81,7 @@ class Asker:
         base: Callable[[], Sequence[Node]],
         wanted: Callable[[Obligation], bool],
     ) -> list[Failure]:
-        """The obligations that do not hold wherever `base` does; those that are `wanted` with a witness."""
+        """Return the obligations that do not hold wherever `base` does; those that are `wanted` come with a witness."""
         if not obligations:
             return []
         self.tally.by_solver += len(obligations)
@@ -96,12 +96,12 @@ class Asker:
     def _failed(
         self, obligations: Sequence[Obligation], base: Sequence[Node], wanted: Sequence[bool]
     ) -> "tuple[_Failed, ...]":
-        """As `unshown`, each obligation by its position."""
+        """Return what `unshown` returns, each obligation by its position."""
         question = _Question(self, obligations, base, wanted)
         return question.remembered("unshown", question.answer)
 
     def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
-        """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
+        """Return whether one question shows that all of them hold wherever `base` does; false where that stays open."""
         if not obligations:
             return True
         if smt.gives_up("whether all holds"):
@@ -118,7 +118,7 @@ def fewest(
 ) -> tuple[Candidate, ...]:
     """Return the fewest candidates that suffice, first in their order; adding one never hurts.
 
-    With many candidates: a choice of which none can be dropped; later ones are dropped first.
+    With many candidates, return a choice of which none can be dropped; later ones are dropped first.
     """
     tried = 0
     for count in range(len(candidates)):
@@ -168,7 +168,7 @@ class _Question:
         return self.asker.order.get(name, len(self.asker.order)), name
 
     def remembered(self, what: str, ask: Callable[[], Answered]) -> Answered:
-        """Ask this, unless the same was answered before: the least witness depends on the order of the variables."""
+        """Return the kept answer to the same question, else ask. The order of the variables counts: the least witness depends on it."""
         names = tuple(node.name for node in self.variables)
         key = (what, tuple(self.wanted), names)
 
@@ -179,7 +179,7 @@ class _Question:
         return answered(key, [*self.bad, *self.known], asked)
 
     def answer(self) -> tuple[_Failed, ...]:
-        """Return what is not shown, in the order owed."""
+        """Return the obligations that are not shown, in the order owed."""
         for at in halved(range(len(self.owed)), self._hold):
             self._fail(at, *self._last)
             self.known.append(values.negation(self.bad[at]))
@@ -189,14 +189,14 @@ class _Question:
         return tuple(self.failures)
 
     def all_hold(self) -> bool:
-        """Whether none of the obligations can fail."""
+        """Return whether none of the obligations can fail."""
         bad = values.any_of(self.bad)
         if self.reals and trial.witness([*self.known, bad], self.variables) is not None:
             return False
         return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
 
     def _hold(self, places: Sequence[int]) -> bool:
-        """Whether these obligations need no further search: they hold, or are given up as open."""
+        """Return whether these obligations need no further search: they hold, or are given up as open."""
         if self.unknown > MOST_UNKNOWN:
             self.failures += [(at, Discharge.OPEN, ()) for at in places]
             return True

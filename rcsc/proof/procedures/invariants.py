@@ -29,7 +29,7 @@ from rcsc.proof.solvers.smt import Answer
 
 
 def at_first(program: Program) -> Iterator[Diagnostic]:
-    """Invariants, and assumptions about states and outputs alone, that the initial values break."""
+    """Yield a finding for each invariant, or assumption about states and outputs alone, that the initial values break."""
     start = initial(program)
     for invariant in program.invariants:
         if fold(invariant.condition, start) is False:
@@ -47,7 +47,7 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
 
 
 def _begun_anew(program: Program) -> dict[str, Value]:
-    """Return the values after a restart, as far as they are constants: what is adopted from a buffer is left out."""
+    """Return the values after a restart that are constants; those adopted from a buffer are left out."""
     start: dict[str, Value] = dict(initial(program))
     for leaf, adopted in program.adopted.items():
         if isinstance(adopted, Fixed):
@@ -76,10 +76,10 @@ def _broken_by_a_restart(
 
 
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
-    """Note, for each file that declares some, that a program alone proves no properties.
+    """Yield a note for each file that declares properties: a program alone proves none.
 
-    Those that come with the protocol are left out: nobody wrote them, and every check would repeat it. That one is not kept is
-    said of its level once it was looked at (`driver.together`).
+    Those that come with the protocol are left out: nobody wrote them, and every check would repeat it. A property that is not kept is
+    reported with its level once that was looked at (`driver.together`).
     """
     files: dict[str, list[Property]] = {}
     for claim in (each for each in program.properties if not each.standard):
@@ -94,9 +94,9 @@ def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
 
 
 def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
-    """Return values that satisfy all assumptions of the table and all invariants, or Z3's answer where it has none.
+    """Return values that satisfy all assumptions of the table and all invariants, or Z3's answer where it finds none.
 
-    A few are tried by hand before Z3 is asked.
+    A few inputs are tried before Z3 is asked.
     """
     conditions = [assumption.condition for assumption in assumed_of(program, table)]
     for trial in _trials(program):
@@ -118,13 +118,13 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
 
 
 def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
-    """The assumptions of the table, and every invariant of the program."""
+    """Return the assumptions of the table and every invariant of the program."""
     named = (assumption for assumption in program.assumptions if assumption.name in table.assumptions)
     return (*named, *program.invariants)
 
 
 def _trials(program: Program) -> Iterator[dict[str, Value]]:
-    """A few inputs that are quickly tried."""
+    """Yield a few inputs that are quickly tried: the initial values, and both ends of every range."""
     yield initial(program)
     for end in (0, 1):
         yield {

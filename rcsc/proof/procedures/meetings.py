@@ -18,11 +18,11 @@ from rcsc.proof.symbolic.alike import Disagreement, alike, disagreement, meeting
 
 @dataclass(frozen=True, slots=True)
 class Met:
-    """What became of the pairs of lines of a table that are said to match together.
+    """The outcome for the pairs of lines of a table that are declared to match together.
 
     Attributes:
-        relied: The invariants and assumptions on which it rests that they do the same.
-        open: Pairs of which nobody could tell whether they ever match together.
+        relied: The invariants and assumptions needed to show that they do the same.
+        open: Pairs of which it stayed open whether they ever match together.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -36,7 +36,7 @@ class Met:
 
 
 def met(program: Program, table: Table, options: Options) -> Met:
-    """Prove what a table says of pairs of its lines; invariants are among the program's assumptions (`meaning.relying`)."""
+    """Prove a table's declarations about pairs of its lines; invariants are among the program's assumptions (`meaning.relying`)."""
     invariants = tuple(AssumptionName(invariant.name) for invariant in program.invariants)
     every = tuple(dict.fromkeys((*invariants, *table.assumptions)))
     grounds = [replace(table, assumptions=names) for names in dict.fromkeys(((), invariants, every))]
@@ -83,7 +83,7 @@ def _apart(
     options: Options,
     near: Mapping[str, Value],
 ) -> Diagnostic:
-    """Report that two lines do not do the same, with an input, or that nobody could tell."""
+    """Report that two lines do not do the same, with an input, or that this could not be decided."""
     names = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}`"
     if effects.same is None:
         helps = ("give each query more steps with `--steps`, or simplify the lines",)
@@ -103,7 +103,7 @@ def _apart(
 
 
 def _results(program: Program, meeting: Meeting, shown: Disagreement) -> Iterator[str]:
-    """Yield what the lines leave different at the input shown."""
+    """Yield each variable's two values after the lines, where they differ, at the input shown."""
     for name, one, other in shown.results:
         kind = program.variable(name).type
         yield f"`{name}` is then {spell(kind, one)} by `{meeting.first}`, {spell(kind, other)} by `{meeting.second}`"
@@ -121,7 +121,7 @@ def _column(program: Program, table: Table, lines: Collection[Line], shown: Disa
 
 
 def _cells(table: Table, line: Line, name: str) -> str:
-    """What a line says of a variable, as it is written; a test of several variables stands with the first."""
+    """Return a line's cells for a variable, as written; a test of several variables stands with the first."""
     return "; ".join(
         test.text
         if name in (column.heading, column.variable) or column.subject is None

@@ -57,14 +57,14 @@ from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 
 
 def called_by_lines(program: Program) -> set[str]:
-    """Procedures that some line of some table calls itself."""
+    """Return the procedures that lines of tables call directly."""
     lines = [line for table in program.tables for line in (*table.lines, table.default) if line is not None]
     actions = [action.statement for line in lines for action in line.actions]
     return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
 
 
 def defined_alone(program: Program, table: Table) -> bool:
-    """Whether the declared ranges alone show every condition of the table to be defined, without a solver."""
+    """Return whether the declared ranges alone show every condition of the table to be defined, without a solver."""
     run = Run(
         {str(procedure.name): procedure for procedure in program.procedures},
         {v.name: v.type for v in program.variables},
@@ -86,8 +86,8 @@ class _Owing:
     """A condition or a line of a table.
 
     Attributes:
-        run: What it owes under some assumptions, and what is known there.
-        stating: Of a condition the lines that state it, and in which column; the table is then not decided without it.
+        run: Runs it under some assumptions; returns its obligations and the facts known there.
+        stating: For a condition, the lines that state it, and in which column; the table is then not decided without it.
     """
 
     run: Callable[[list[Node]], tuple[Run, Known]]
@@ -98,12 +98,12 @@ class _Owing:
 
 @dataclass(slots=True)
 class Obligations:
-    """Proves what one program owes.
+    """Proves the obligations of one program.
 
     Attributes:
         tally: How it was settled.
         undefined: Tables with a condition, or an assumption, that is not defined for every input.
-        unsafe: Tables of which a line or a condition owes what is not shown.
+        unsafe: Tables with a line or a condition that has an obligation not shown.
         stops: By table, the assumptions on which the safety of its conditions and lines rests.
     """
 
@@ -131,7 +131,7 @@ class Obligations:
         self._kept = [(invariant, set(read_by(invariant.condition))) for invariant in self.program.invariants]
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
-        """Report what is wrong with conditions, deferred values, procedures, levels, and lines of `tables`."""
+        """Prove and report the obligations of conditions, deferred values, procedures, levels, and lines of `tables`."""
         with self._budget():
             self._conditions()
             self._deferred()
@@ -144,14 +144,14 @@ class Obligations:
         return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
 
     def stopping(self, tables: Iterable[Table]) -> dict[str, tuple[AssumptionName, ...]]:
-        """Return the stopping assumptions of the tables, and report nothing."""
+        """Return the stopping assumptions of the tables; report nothing."""
         for table in tables:
             with self._budget():
                 self._table(table)
         return self.stops
 
     def _budget(self) -> AbstractContextManager[Budget]:
-        """Budget all questions about a table, a list of procedures, or the conditions outside tables."""
+        """Return a budget for all questions about a table, a list of procedures, or the conditions outside tables."""
         return smt.together(self.options.together)
 
     # --- what is known ---
@@ -160,7 +160,7 @@ class Obligations:
         return Run(self._procedures, self._kinds, self._start)
 
     def _known(self, conditions: Iterable[Expr]) -> list[Node]:
-        """The conditions before a run; what they owe themselves is owed elsewhere."""
+        """Evaluate the conditions before a run; their own obligations are discharged elsewhere."""
         run = self._run()
         return [run.evaluate(condition) for condition in conditions]
 
@@ -170,7 +170,7 @@ class Obligations:
     # --- conditions ---
 
     def _conditions(self) -> None:
-        """Assumptions, invariants, `deferred until` and selectors."""
+        """Discharge assumptions, invariants, `deferred until` and selectors."""
         deferred = [v.deferred_until for v in self.program.variables if v.deferred_until is not None]
         selectors = [selector for level in self.program.levels for selector in level.selectors]
         for invariant in self.program.invariants:
@@ -185,7 +185,7 @@ class Obligations:
                 self._follows(assumption.name, assumption.condition, assumption.span)
 
     def _defined(self, condition: Expr, base: list[Node]) -> bool:
-        """Whether evaluating the condition cannot go wrong."""
+        """Prove that evaluating the condition cannot go wrong; return whether that is shown."""
         return self._settle(self._evaluated(condition, base), lambda: base, "", "")
 
     def _evaluated(self, condition: Expr, base: list[Node], cell: Span = NOWHERE) -> Run:
@@ -197,7 +197,7 @@ class Obligations:
         return run
 
     def _follows(self, name: str, condition: Expr, span: Span) -> None:
-        """An assumption that claims to be proved follows from ranges and invariants."""
+        """Prove that an assumption declared `proved` follows from the ranges and the invariants."""
         run = self._run()
         [good] = self._known([condition])
         message = f"assumption `{name}` does not follow from the declared ranges and the invariants"
@@ -205,7 +205,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _tests(self, table: Table) -> Iterator[_Owing]:
-        """Every condition of the table is evaluated in every cycle, whatever the others say."""
+        """Yield every condition of the table that may be undefined: each is evaluated in every cycle, whatever the others say."""
         every = {id(test): test for line in table.lines for test in line.tests}
         owing = {key for key, test in every.items() if test is not None and may_be_undefined(test.condition)}
         stating: dict[int, list[tuple[Line, int]]] = {}
@@ -250,7 +250,7 @@ class Obligations:
             self.stops[table.name] = tuple(assumption.name for assumption in chosen)
 
     def _suffice(self, needing: Iterable[_Owing], chosen: Sequence[Assumption]) -> bool:
-        """Whether these assumptions show all that is not reported under all of them."""
+        """Return whether these assumptions show everything that all of them together show."""
         for owing in needing:
             run, known = owing.run(self._known(assumption.condition for assumption in chosen))
             left = [
@@ -265,7 +265,7 @@ class Obligations:
     # --- runs outside lines ---
 
     def _deferred(self) -> None:
-        """All deferred values whose condition holds are taken at once."""
+        """Discharge the taking of deferred values: all whose condition holds are taken at once."""
         deferred = [v for v in self.program.variables if v.deferred_until is not None]
         if not deferred or not self._kept:
             return
@@ -278,7 +278,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _safe_values(self) -> None:
-        """After a fault outputs show their safe values; invariants held where the cycle ended, and go on to hold."""
+        """Discharge the showing of safe values after a fault: invariants held where the cycle ended, and must go on to hold."""
         shown = [v for v in self.program.variables if v.safe is not None]
         if not shown or not self._kept:
             return
@@ -290,7 +290,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _levels(self) -> None:
-        """Discharge what a level runs before its table and after it, each list in one run."""
+        """Discharge the procedures that a level runs before its table and after it, each list in one run."""
         for level in self.program.levels:
             for words, names in (("preprocess", level.preprocess), ("postprocess", level.postprocess)):
                 calls = [Call(self._procedures[name].name) for name in names]
@@ -318,7 +318,7 @@ class Obligations:
         return run
 
     def _uncalled(self) -> None:
-        """Procedures that no line and no level runs, for all values of their parameters."""
+        """Discharge the procedures that no line and no level runs, for all values of their parameters."""
         levels = self.program.levels
         outside = {str(name) for level in levels for name in (*level.preprocess, *level.postprocess)}
         inside = self._closure(called_by_lines(self.program) | outside)
@@ -333,7 +333,7 @@ class Obligations:
                         self._settle(run, list, "", "")
 
     def _closure(self, called: set[str]) -> set[str]:
-        """The procedures that run when these do."""
+        """Return the procedures that run when these do."""
         waiting, seen = list(called), set(called)
         while waiting:
             for statement in everything(self._procedures[waiting.pop()].body):
@@ -343,7 +343,7 @@ class Obligations:
         return seen
 
     def _alone(self, procedure: Procedure) -> Run | None:
-        """The procedure for all values of its parameters; None where it runs too long to follow."""
+        """Run the procedure for all values of its parameters; None where it runs too long to follow."""
         run = self._run()
         try:
             run.call(
@@ -357,7 +357,7 @@ class Obligations:
     # --- lines ---
 
     def _plain(self, actions: tuple[Action, ...]) -> bool:
-        """Whether the line's actions owe nothing, as far as is seen without a run."""
+        """Return whether the line's actions are seen, without a run, to owe nothing."""
         written: set[str] = set()
         for action in actions:
             names = self._plainly_written(action.statement)
@@ -367,7 +367,7 @@ class Obligations:
         return not any(written & reads for _, reads in self._kept)
 
     def _plainly_written(self, statement: Statement) -> set[str] | None:
-        """Return what the statement writes; None where it may owe something."""
+        """Return the variables that the statement writes; None where it may owe something."""
         match statement:
             case Assign(place=ToLeaf(name=name, type=kind), value=Literal(value=value)):
                 low, high = values.bounds(kind)
@@ -399,7 +399,7 @@ class Obligations:
         return run, lambda: [*base, self._none(table)] if isinstance(line, Default) else base
 
     def _none(self, table: Table) -> Node:
-        """State that no line matches."""
+        """Return the condition that no line matches."""
         return values.all_of(
             values.negation(
                 values.all_of(self._known(test.condition for test in line.tests if test is not None))
@@ -408,7 +408,7 @@ class Obligations:
         )
 
     def _actions(self, run: Run, actions: tuple[Action, ...]) -> None:
-        """Runs them left to right; what two of them write gets one value."""
+        """Run the actions left to right; a variable written by two of them must get one value."""
         written: dict[str, tuple[Node, str]] = {}
         for action in actions:
             before = run.state
@@ -433,7 +433,7 @@ class Obligations:
     # --- settling ---
 
     def _keep(self, run: Evaluation, who: str, span: Span) -> None:
-        """Owes every invariant that the run may have touched."""
+        """Owe every invariant that the run may have touched."""
         for invariant, reads in self._kept:
             if not reads.isdisjoint(run.state.leaves):
                 after = self._run()
@@ -449,7 +449,7 @@ class Obligations:
         table: str,
         stating: Sequence[tuple[Line, int]] = (),
     ) -> bool:
-        """Ask what bounds did not settle; return whether all is shown."""
+        """Ask about the obligations that bounds did not settle; return whether all are shown."""
         self.tally.by_intervals += run.settled
         failures = self._asker.unshown(run.obligations, base, self._shown)
         for failure in failures:
@@ -462,7 +462,7 @@ class Obligations:
         return not failures
 
     def _shown(self, owed: Obligation) -> bool:
-        """Whether to look for a witness: its cause has too few."""
+        """Return whether to look for a witness: its cause has too few."""
         cause = self._causes.get((owed.code, owed.span, owed.message))
         return cause is None or len(cause.failures) < MOST_WITNESSES
 
@@ -474,7 +474,7 @@ class Obligations:
 
 
 def _told_at(span: Span, failure: Failure, stating: Sequence[tuple[Line, int]]) -> Span:
-    """The place in the first of the lines that state a condition which the witness does not keep from matching."""
+    """Return the span of a shared condition in the first line that states it and that the witness does not keep from matching."""
     witness = {str(variable.name): value for variable, value in failure.witness}
 
     def can_match(line: Line, column: int) -> bool:
@@ -491,5 +491,5 @@ def _told_at(span: Span, failure: Failure, stating: Sequence[tuple[Line, int]]) 
 
 
 def _name_of(line: Line | Default) -> Span:
-    """The span of the line's name."""
+    """Return the span of the line's name."""
     return line.cell_span(-1) if isinstance(line, Line) else line.span

@@ -20,7 +20,7 @@ from rcsc.proof.solvers.smt import Answer
 
 
 def assumed_together(program: Program, options: Options) -> Iterator[Diagnostic]:
-    """Yield an error for each two tables of one level that assume of the inputs what cannot hold together."""
+    """Yield an error for each two tables of one level whose assumptions about the inputs contradict each other."""
     inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
     plain = {each.name for each in program.assumptions if inputs.issuperset(read_by(each.condition))}
     tables = {table.name: table for table in program.tables}
@@ -35,7 +35,7 @@ def assumed_together(program: Program, options: Options) -> Iterator[Diagnostic]
 def _of_two(
     program: Program, level: Level, first: Table, second: Table, plain: set[AssumptionName], options: Options
 ) -> Iterator[Diagnostic]:
-    """Yield an error where what both assume of the inputs is impossible, and what each assumes is not."""
+    """Yield an error where the two tables' assumptions about inputs are impossible together, and possible for each alone."""
     names = [[name for name in table.assumptions if name in plain] for table in (first, second)]
     if not all(names) or not _impossible(program, first, [*names[0], *names[1]], options):
         return
@@ -51,7 +51,7 @@ def _of_two(
 
 
 def _impossible(program: Program, table: Table, names: list[AssumptionName], options: Options) -> bool:
-    """Whether no values satisfy these assumptions and the invariants."""
+    """Return whether no values satisfy these assumptions and the invariants."""
     asked = replace(table, assumptions=tuple(dict.fromkeys(names)))
     try:
         return assumptions_satisfiable(program, asked, options) is Answer.UNSATISFIABLE

@@ -17,12 +17,12 @@ inputs and what else is wrong, whether lines do the same, whether Z3 agrees, wha
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one question may cost.
+    """The most that one question may cost.
 
     Attributes:
-        steps: Z3's own count of what it does (`rlimit`): the budget, which does not depend on the machine.
+        steps: Z3's own count of its work (`rlimit`): the budget, which does not depend on the machine.
         memory_mb: For all questions of the process.
-        cpu_s: Seconds of processor time, a backstop against what Z3 does without counting it; `smt.cut_short` tells of it.
+        cpu_s: Seconds of processor time, a backstop against work that Z3 does not count; `smt.cut_short` tells of it.
     """
 
     steps: int = STEPS
@@ -31,7 +31,7 @@ class Limits:
 
     @classmethod
     def of(cls, steps: int, memory_mb: int = 4_096, cpu_s: float = 0.0) -> "Limits":
-        """Limits whose backstop leaves the steps several times what they take, or is said."""
+        """Return limits; the backstop, where none is given, leaves the steps several times what they take."""
         return cls(steps, memory_mb, cpu_s or max(60.0, 3e-6 * steps))
 
 
@@ -47,8 +47,8 @@ class Options:
             table, `boxes` none (procedures are still Z3's).
         jobs: Processes that prove tables.
         cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
-        brief: Whether what would mend a finding, and whether lines that overlap do the same, is left for later.
-        bare: Whether it is enough to know what is wrong, at any input: the least one, and the region around it, are not looked for.
+        brief: Whether repairs of findings, and whether overlapping lines do the same, are left for later.
+        bare: Whether any witness is enough: the least input, and the region around it, are not looked for.
     """
 
     steps: int = STEPS
@@ -61,20 +61,20 @@ class Options:
 
     @property
     def limits(self) -> Limits:
-        """What one question to the solver may cost."""
+        """The limits of one question to the solver."""
         return Limits.of(self.steps, self.memory_mb, self.cpu_s)
 
     @property
     def together(self) -> int:
-        """What all questions about one table, or one procedure, may cost."""
+        """The steps that all questions about one table, or one procedure, may take."""
         return TOGETHER * self.steps
 
     @property
     def drawn(self) -> int:
-        """What all questions about one graph may cost."""
+        """The steps that all questions about one graph may take."""
         return DRAWN * self.steps
 
     @property
     def few(self) -> "Options":
-        """For what is asked beside something that is wrong: a question may take so much as all of them together (`WRONG_STEPS`)."""
+        """The options for questions beside a known error: one question may take as much as all of them together (`WRONG_STEPS`)."""
         return replace(self, steps=min(self.steps, WRONG_STEPS))

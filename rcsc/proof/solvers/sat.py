@@ -26,7 +26,7 @@ def _pysat() -> Any:
 
 
 def _simplified(clauses: Iterable[list[int]], read: Iterable[int]) -> list[list[int]]:
-    """Return clauses that say the same of the variables that are read: others go where that takes no more clauses.
+    """Return clauses that are equivalent for the variables read; others are eliminated where that takes no more clauses.
 
     Source: Een and Biere, "Effective preprocessing in SAT through variable and clause elimination", 2005.
     """
@@ -59,7 +59,7 @@ class Sat:
         """Assert the clauses.
 
         Args:
-            clauses: Literals of which one holds, each.
+            clauses: Each a list of literals, one of which holds.
             read: All literals that are added, assumed or read later, but new variables; by default any may be.
         """
         kept = list(read)
@@ -68,11 +68,11 @@ class Sat:
         self.queries = 0
 
     def add(self, clause: list[int]) -> None:
-        """Asserts that one of the literals holds."""
+        """Assert that one of the literals holds."""
         self._solver.add_clause(clause)
 
     def holds(self, assuming: Iterable[int]) -> bool:
-        """Whether everything asserted, and these literals, hold together.
+        """Return whether all that is asserted can hold together with these literals.
 
         Raises:
             GaveUpError: After `BUDGET` conflicts; after `QUESTIONS` questions or `CONFLICTS` conflicts in all.
@@ -94,14 +94,14 @@ class Sat:
         return bool(answer)
 
     def value(self, literal: int) -> bool:
-        """Value of a literal in the last model; a variable in no clause is false."""
+        """Return the value of a literal in the last model; a variable in no clause is false."""
         at = abs(literal) - 1
         return (at < len(self._model) and self._model[at] > 0) == (literal > 0)
 
     def core(self) -> frozenset[int]:
-        """Unsatisfiable core of the assumptions of the last question."""
+        """Return the unsatisfiable core of the assumptions of the last question."""
         return frozenset(self._solver.get_core() or ())
 
     def close(self) -> None:
-        """Frees its memory, which Python does not see."""
+        """Free the solver's memory, which Python does not see."""
         self._solver.delete()

@@ -10,9 +10,9 @@ Item = TypeVar("Item")
 
 
 def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
-    """Return the greatest value up to `end` that fits, as `start` and all between do.
+    """Return the greatest value up to `end` that fits; `start` fits, and so does every value between.
 
-    The end is tried first: what is grown often goes as far as its variable does, and that takes one question.
+    The end is tried first: a region often grows as far as its variable's range, and then one question is enough.
     """
     if start == end or fits(end):
         return end
@@ -32,7 +32,7 @@ def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int
     Args:
         low: A lower bound.
         known: A value that exists.
-        up_to: Finds a value from a least one up to a limit, or None where there is none; `known` where nobody can tell.
+        up_to: Finds a value between two limits, or None where there is none; returns `known` where that stays open.
     """
     limit = low  # where most are
     while low < known:
@@ -48,9 +48,9 @@ def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int
 
 
 def halved(items: Sequence[Item], settled: Callable[[Sequence[Item]], bool]) -> Iterator[Item]:
-    """Yield, in order, each item that is not settled even alone: all are asked about together, then halves of what is not settled.
+    """Yield, in order, each item that is not settled even alone: ask about all together, then about the halves of what is not settled.
 
-    Of 8 items with one that stands out that takes 7 questions. What follows an item is asked about when the next one is wanted.
+    For 8 items of which one is not settled that takes 7 questions. Later items are asked about only when the next one is wanted.
     """
     if not items or settled(items):
         return

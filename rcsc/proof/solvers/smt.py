@@ -25,7 +25,7 @@ Term = NewType("Term", object)
 
 
 class Answer(Enum):
-    """What the solver says of the formulas together."""
+    """The solver's answer about the formulas together."""
 
     SATISFIABLE = auto()
     UNSATISFIABLE = auto()
@@ -45,10 +45,10 @@ _threads = threading.Event()
 
 
 def for_threads() -> None:
-    """Let every thread of this process let go of terms, whichever of them asks at the time.
+    """Make it safe for any thread of this process to release terms while another one asks.
 
-    Python throws away what is in a cycle in whatever thread happens to run, and Z3, unless told, counts there without care: the question
-    that another thread asks meanwhile is answered wrongly, or the process ends. Threads still ask one after the other.
+    Python collects cycles in whatever thread happens to run, and Z3, unless told, is not safe against that: the question that another
+    thread asks meanwhile is answered wrongly, or the process ends. Threads still ask one after the other.
     """
     if not _threads.is_set():
         _threads.set()
@@ -75,12 +75,12 @@ _open: list[str] = []
 
 
 def unanswered() -> int:
-    """Count this process's questions that had no answer: where none is added, a larger budget changes nothing."""
+    """Count this process's questions without an answer; while the count stays, a larger budget changes nothing."""
     return len(_open)
 
 
 def leave_open(why: str) -> None:
-    """Count a question that nobody asked, to be asked later."""
+    """Count a question that is left to be asked later."""
     _open.append(why)
 
 
@@ -88,7 +88,7 @@ def leave_open(why: str) -> None:
     slots=True, eq=False
 )  # each is itself: of two that are as far spent, one inside the other, either ends by itself
 class Budget:
-    """What all questions that are asked inside `together` may cost.
+    """The most that all questions asked inside `together` may cost.
 
     Attributes:
         left: Steps; with none left nothing more is asked, and every answer is `UNKNOWN`.
@@ -100,24 +100,24 @@ class Budget:
 
     @property
     def spent(self) -> bool:
-        """Whether there are none left."""
+        """Whether no steps are left."""
         return self.left <= 0
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class _Until(Budget):
-    """No steps, but something that happens, in place of a budget: for who shows what is known so far, or gives up."""
+    """A budget that ends with an event instead of steps, for a caller that shows partial results, or gives up."""
 
     over: Callable[[], bool]
 
     @property
     def spent(self) -> bool:
-        """Whether it has happened."""
+        """Whether the event has happened."""
         return self.over()
 
 
 class _Thread(threading.local):
-    """What a thread's questions may cost: what one gives up is not given up by another."""
+    """The budgets of a thread: a question that one thread gives up is not given up by another."""
 
     def __init__(self) -> None:
         self.budgets: list[Budget] = []
@@ -134,10 +134,10 @@ _breaking = threading.Lock()
 
 @contextmanager
 def until(over: Callable[[], bool], *, breaks_off: bool = False) -> Iterator[None]:
-    """Inside, nothing more is asked once something is over; every answer is then `UNKNOWN`.
+    """Ask nothing more inside once an event has happened; every answer is then `UNKNOWN`.
 
     Args:
-        over: Whether it is.
+        over: Tells whether it has happened.
         breaks_off: Whether the question under way is broken off, too; `over` is then asked in another thread as well.
     """
     ending, left = _Until(sys.maxsize, over=over), threading.Event()
@@ -168,7 +168,7 @@ def _watch(over: Callable[[], bool], left: threading.Event, asker: int) -> None:
 
 
 def _absorb() -> None:
-    """Ask something that anybody can answer until Z3 does: what is stated before it has heard that it is broken off may be lost."""
+    """Ask a trivial question until Z3 answers it: until it has noticed an interrupt, what is stated may be lost."""
     z3, answer = _z3(), None
     while answer != z3.sat:
         solver = z3.Solver()
@@ -178,7 +178,7 @@ def _absorb() -> None:
 
 @contextmanager
 def together(steps: int, *, of_all: bool = False) -> Iterator[Budget]:
-    """Inside, all questions of all solvers take at most so many steps; with `of_all` what is charged outside Z3, too."""
+    """Bound the steps of all questions, of all solvers, asked inside; with `of_all` also the work charged outside Z3."""
     budget = Budget(steps, of_all)
     with within(budget):
         yield budget
@@ -186,7 +186,7 @@ def together(steps: int, *, of_all: bool = False) -> Iterator[Budget]:
 
 @contextmanager
 def within(budget: Budget) -> Iterator[None]:
-    """Inside, all questions take at most what a budget has left: again for each part of a work that has one in all."""
+    """Bound all questions asked inside by the rest of a budget; the parts of one work share a budget in this way."""
     _own.budgets.append(budget)
     try:
         yield
@@ -195,7 +195,7 @@ def within(budget: Budget) -> Iterator[None]:
 
 
 def charge(steps: int) -> bool:
-    """Take what a piece of work outside Z3 costs, in its steps, from the budgets that bound both; return whether one is spent."""
+    """Charge work done outside Z3, in its steps, to the budgets that bound both; return whether one is spent."""
     charged = [budget for budget in _own.budgets if budget.of_all]
     for budget in charged:
         budget.left -= steps
@@ -203,15 +203,15 @@ def charge(steps: int) -> bool:
 
 
 def spent() -> bool:
-    """Whether no question is asked any more, so that none need be made."""
+    """Return whether a budget is spent, so that no question need be made."""
     return any(budget.spent for budget in _own.budgets)
 
 
 def gives_up(what: str) -> bool:
-    """Whether something is over (`until`): what takes long outside Z3 asks it, and what is then not looked for counts as left open.
+    """Return whether an event (`until`) ends long work outside Z3; what is then not looked for counts as left open.
 
     Args:
-        what: What would be looked for.
+        what: The thing that would be looked for.
     """
     if any(isinstance(budget, _Until) and budget.spent for budget in _own.budgets):
         leave_open(what)
@@ -220,7 +220,7 @@ def gives_up(what: str) -> bool:
 
 
 def troubles() -> tuple[type[BaseException], ...]:
-    """Errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
+    """Return the errors of Z3 and of exhausted memory, also outside a check; after one nothing is proved."""
     loaded = sys.modules.get("z3")
     return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
 
@@ -230,7 +230,7 @@ def _float_sort(kind: Real) -> Any:
 
 
 def variable(name: str, kind: Scalar) -> Term:
-    """A fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
+    """Return a fresh constant: Bool, IEEE double or single, or a mathematical integer (also for enumerations)."""
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.Bool(name))
@@ -238,15 +238,15 @@ def variable(name: str, kind: Scalar) -> Term:
 
 
 def word(name: str, bits: int) -> Term:
-    """A fresh constant for a whole number that is its bits: of masks hundreds of times quicker than an integer.
+    """Return a fresh constant for a whole number as its bits; for masks that is hundreds of times quicker than an integer.
 
-    Where that is calculated with otherwise, it is the integer that they are, which takes longer: `expressions.words.bits_alone`.
+    In other arithmetic it becomes the integer of these bits, which takes longer: `expressions.words.bits_alone`.
     """
     return Term(_z3().BitVec(name, bits))
 
 
 def literal(kind: Scalar, value: Value) -> Term:
-    """A constant of the kind."""
+    """Return a constant of the kind."""
     z3 = _z3()
     if isinstance(kind, Bool):
         return Term(z3.BoolVal(bool(value)))
@@ -256,60 +256,60 @@ def literal(kind: Scalar, value: Value) -> Term:
 
 
 def member(name: str) -> Term:
-    """A fresh constant for a member of an enumeration, by index, in 16 bits: quicker than an integer."""
+    """Return a fresh constant for a member of an enumeration, as its index in 16 bits: quicker than an integer."""
     return Term(_z3().BitVec(name, 16))
 
 
 def member_literal(index: int) -> Term:
-    """A member as a constant; indices are far below the sign bit, so that order is theirs."""
+    """Return a member as a constant; indices are far below the sign bit, so that bits are ordered as they are."""
     return Term(_z3().BitVecVal(index, 16))
 
 
 def number(name: str) -> Term:
-    """A fresh constant for a real number, with no end to its digits."""
+    """Return a fresh constant for a real number of unlimited precision."""
     return Term(_z3().Real(name))
 
 
 def fraction(value: float) -> Term:
-    """A finite double as the number that it is."""
+    """Return a finite double as an exact real number."""
     return Term(_z3().RealVal(str(Fraction(value))))
 
 
 def as_number(term: Term) -> Term:
-    """An integer among the real numbers."""
+    """Convert an integer to a real number."""
     return Term(_z3().ToReal(_whole(term)))
 
 
 def truth(value: bool) -> Term:
-    """The constant true or false."""
+    """Return the constant true or false."""
     return Term(_z3().BoolVal(value))
 
 
 def negation(term: Term) -> Term:
-    """Negate it."""
+    """Return the negation of the term."""
     return Term(_z3().Not(term))
 
 
 def all_of(terms: Sequence[Term]) -> Term:
-    """Every one; true when there are none."""
+    """Return the conjunction; true when there are no terms."""
     return (
         Term(_z3().And(list(terms))) if terms else truth(True)
     )  # other solvers do not read `and` of nothing
 
 
 def any_of(terms: Sequence[Term]) -> Term:
-    """At least one; false when there are none."""
+    """Return the disjunction; false when there are no terms."""
     return Term(_z3().Or(list(terms))) if terms else truth(False)
 
 
 def _whole(term: Term) -> Any:
-    """A whole number as an integer."""
+    """Return a whole number as an integer."""
     z3: Any = _z3()
     return z3.BV2Int(term) if z3.is_bv(term) else term
 
 
 def _alike(left: Term, right: Term) -> tuple[Any, Any]:
-    """Two whole numbers as terms of one sort: bits where both are, or one is a constant that has no more bits; else integers."""
+    """Return two whole numbers as terms of one sort: bits where both are, or one is a constant of no more bits; else integers."""
     z3: Any = _z3()
     one: Any = left
     other: Any = right
@@ -324,23 +324,23 @@ def _alike(left: Term, right: Term) -> tuple[Any, Any]:
 
 
 def at_point(term: Term, point: Sequence[tuple[Term, Term]]) -> Term:
-    """What is left of a term where constants, each given with a literal of its kind, have these values: mostly true or false."""
+    """Put values in for constants, each given with a literal of its kind, and simplify; mostly that leaves true or false."""
     z3: Any = _z3()
     return Term(z3.simplify(z3.substitute(term, *(_alike(leaf, value) for leaf, value in point))))
 
 
 def implication(left: Term, right: Term) -> Term:
-    """Left implies right."""
+    """Return the term that `left` implies `right`."""
     return Term(_z3().Implies(left, right))
 
 
 def choice(condition: Term, then: Term, orelse: Term) -> Term:
-    """`then` where the condition holds, else `orelse`."""
+    """Return `then` where the condition holds, else `orelse`."""
     return Term(then if then is orelse else _z3().If(condition, *_alike(then, orelse)))
 
 
 def equal(left: Term, right: Term, kind: Scalar) -> Term:
-    """Equality of two values of the kind; 0.0 equals -0.0."""
+    """Return the term that two values of the kind are equal; 0.0 equals -0.0."""
     if isinstance(kind, Real):
         return Term(_z3().fpEQ(left, right))
     a, b = _alike(left, right)
@@ -348,7 +348,7 @@ def equal(left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def at_most(left: Term, right: Term, kind: Scalar) -> Term:
-    """`left <= right`; false comes before true."""
+    """Return the term `left <= right`; false comes before true."""
     z3: Any = _z3()
     if isinstance(kind, Bool):
         return Term(z3.Implies(left, right))
@@ -359,7 +359,7 @@ def at_most(left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def below(left: Term, right: Term, kind: Scalar) -> Term:
-    """`left < right`; false comes before true."""
+    """Return the term `left < right`; false comes before true."""
     z3: Any = _z3()
     if isinstance(kind, Bool):
         return Term(z3.And(z3.Not(left), right))
@@ -370,7 +370,7 @@ def below(left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def integer_operation(op: str, left: Term, right: Term) -> Term:
-    """`+ - * / mod` of mathematical integers, the first three also of real numbers; `/` rounds toward zero, `mod` goes with it."""
+    """Return `left op right` of mathematical integers, or of reals for `+ - *`; `/` rounds toward zero, `mod` goes with it."""
     z3: Any = _z3()
     if op in ("/", "mod") and z3.is_bv(left) and z3.is_int_value(right):
         by: Any = right
@@ -385,7 +385,7 @@ def integer_operation(op: str, left: Term, right: Term) -> Term:
 
 
 def part(op: str, left: Term, right: int) -> Term:
-    """`/` and `mod` of an integer that is not below zero by one above: of bits of words, which are many, in few terms."""
+    """Return `/` or `mod` of a nonnegative integer by a positive one; of the bits of a word, by a power of two, that takes few terms."""
     z3: Any = _z3()
     a: Any = left
     places = right.bit_length() - 1
@@ -399,32 +399,32 @@ def part(op: str, left: Term, right: int) -> Term:
 
 
 def masked(word: Term, care: int, value: int) -> Term | None:
-    """State that a word has these bits of those that are looked at; None for one that is a number."""
+    """Return the term that the word's bits in `care` are those of `value`; None for a word that is an integer."""
     z3: Any = _z3()
     a: Any = word
     return Term(a & care == value) if z3.is_bv(a) else None
 
 
 def quotient(left: Term, right: float) -> Term:
-    """A real number divided by one that is not zero."""
+    """Return a real number divided by a nonzero constant."""
     a: Any = left
     return Term(a / _z3().RealVal(str(Fraction(right))))
 
 
 def float_operation(op: str, left: Term, right: Term) -> Term:
-    """`+ - * /` of doubles, or of singles, rounded to nearest even."""
+    """Return `+ - * /` of doubles, or of singles, rounded to nearest even."""
     z3: Any = _z3()
     operation = {"+": z3.fpAdd, "-": z3.fpSub, "*": z3.fpMul, "/": z3.fpDiv}[op]
     return Term(operation(z3.RNE(), left, right))
 
 
 def minus(term: Term, kind: Scalar) -> Term:
-    """The negative."""
+    """Return the negative of a number."""
     return Term(_z3().fpNeg(term) if isinstance(kind, Real) else -_whole(term))
 
 
 def absolute(term: Term, kind: Scalar) -> Term:
-    """The value without its sign."""
+    """Return the absolute value of a number."""
     z3: Any = _z3()
     if isinstance(kind, Real):
         return Term(z3.fpAbs(term))
@@ -433,7 +433,7 @@ def absolute(term: Term, kind: Scalar) -> Term:
 
 
 def to_float(term: Term, kind: Scalar, target: Real) -> Term:
-    """The nearest double or single, as `target` is, of a term of this kind: an integer, a double or a single."""
+    """Convert an integer, a double or a single to the nearest double or single, as `target` is."""
     z3: Any = _z3()
     if isinstance(kind, Real):
         return Term(z3.fpFPToFP(z3.RNE(), term, _float_sort(target)))
@@ -441,7 +441,7 @@ def to_float(term: Term, kind: Scalar, target: Real) -> Term:
 
 
 def to_integer(term: Term) -> Term:
-    """A finite double or single without its fraction."""
+    """Convert a finite double or single to an integer, without its fraction."""
     z3: Any = _z3()
     return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
 
@@ -472,12 +472,12 @@ class Solver:
         self.names = 0
 
     def begins_anew(self, steps: int, seed: int) -> None:
-        """Have each question from now on take so many steps at most, by another way through the same search."""
+        """Bound each later question to so many steps, and seed the search anew."""
         self._steps = steps
         self._solver.set("random_seed", seed)
 
     def named(self, term: Term) -> Term:
-        """Return a constant that stands for the term: quicker to read from a model, and to ask of. Call outside `push`."""
+        """Return a constant that equals the term: quicker to read from a model, and to ask about. Call outside `push`."""
         defined: Any = term
         self.names += 1
         constant: Any = _z3().Const(f"named!{self.names}", defined.sort())
@@ -485,7 +485,7 @@ class Solver:
         return Term(constant)
 
     def switch(self, term: Term) -> Term:
-        """Return a constant under which, assumed in `check`, the term holds; what is learnt meanwhile outlives the question."""
+        """Return a constant that, assumed in `check`, makes the term hold; what is learnt meanwhile outlives the question."""
         asked: Any = term
         if _z3().is_const(asked):
             return term
@@ -495,23 +495,23 @@ class Solver:
         return constant
 
     def add(self, *terms: Term) -> None:
-        """Asserts the terms."""
+        """Assert the terms."""
         self._solver.add(*terms)
         if self._added:
             self._added[-1] += terms
 
     def push(self) -> None:
-        """Remembers what is asserted."""
+        """Remember what is asserted now, for `pop`."""
         self._solver.push()
         self._added.append([])
 
     def pop(self) -> None:
-        """Goes back to what was remembered."""
+        """Drop what was asserted since the last `push`."""
         self._solver.pop()
         self._added.pop()
 
     def check(self, *assuming: Term) -> Answer:
-        """Whether all asserted terms, and these, hold together for some values."""
+        """Ask whether all that is asserted can hold together with these terms."""
         self._model = None
         if spent():
             _open.append("spent")
@@ -534,7 +534,7 @@ class Solver:
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
 
     def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:
-        """Z3's answer and why there is none; asked again where other processes took the time that it was given."""
+        """Return Z3's answer, and why there is none; ask again where other processes took the time that it was given."""
         z3 = _z3()
         while True:
             counted = self._count()
@@ -558,7 +558,7 @@ class Solver:
             self._wait()
 
     def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
-        """What Z3 says, and whether it was broken off."""
+        """Return Z3's answer, and whether it was broken off."""
         asker, broken_off = threading.get_ident(), False
         with _breaking:
             _asking[asker] = False
@@ -572,31 +572,31 @@ class Solver:
         return answer, broken_off
 
     def _give(self, steps: int) -> None:
-        """Has Z3 end the next question after so many steps."""
+        """Make Z3 end each later question after so many steps."""
         if steps != self._given:
             self._given = steps
             self._solver.set("rlimit", steps)
 
     def _count(self) -> int:
-        """Steps that Z3 has counted so far, where anybody wants to know."""
+        """Return the steps that Z3 has counted so far; 0 where no budget needs them."""
         return int(self._solver.statistics().get_key_value("rlimit count")) if _own.budgets else 0
 
     def _charge(self, before: int) -> None:
-        """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
+        """Charge a question's steps to all budgets; not those of an attempt that only the clock ended."""
         used = self._count() - before
         for budget in _own.budgets:
             budget.left -= used
 
     def _wait(self) -> None:
-        """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""
+        """Make Z3 end a question after so much time has passed; on a busy machine that is more than the time that it gets."""
         self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
 
     def script(self) -> str:
-        """Spell what is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
+        """Spell all that is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"
 
     def refutations(self) -> str:
-        """Return a script that is unsatisfiable just if all such answers, one at least, were right; call outside `push`."""
+        """Return a script that is unsatisfiable just if all unsatisfiable answers, at least one, were right; call outside `push`."""
         self.push()
         self.add(any_of(self.refuted))
         script = self.script()
@@ -604,7 +604,7 @@ class Solver:
         return script
 
     def value(self, term: Term, kind: Scalar) -> Value:
-        """The value of a constant in the model of the last satisfiable answer."""
+        """Return the value of a constant in the model of the last satisfiable answer."""
         z3 = _z3()
         if self._model is None:
             self._model = self._solver.model()

@@ -9,12 +9,12 @@ CVC5_STEPS = 20_000_000
 
 
 def cvc5_refutes(text: str, steps: int = CVC5_STEPS) -> bool:
-    """Whether cvc5 is there and finds the script unsatisfiable within so many of its resource units."""
+    """Return whether cvc5 finds the script unsatisfiable within so many of its resource units; false where it is not installed."""
     return cvc5_says(text, steps) == "unsat"
 
 
 def cvc5_says(text: str, steps: int = CVC5_STEPS) -> str:
-    """cvc5's last answer to the script; "" where cvc5 is not there, or fails."""
+    """Return cvc5's last answer to the script; "" where cvc5 is not installed, or fails."""
     try:
         import cvc5  # type: ignore[import-untyped, unused-ignore]  # optional, and heavy to load
     except ImportError:

@@ -22,7 +22,7 @@ MOST_PATTERNS = 1 << 20
 
 
 def applies(table: Table) -> bool:
-    """Whether every test of the table is a box."""
+    """Return whether every test of the table is a box."""
     return all(test is None or test.box is not None for line in table.lines for test in line.tests)
 
 
@@ -54,12 +54,12 @@ def _of_test(test: Test, words: Words) -> Mapping[str, Box]:
 
 @dataclass(slots=True)
 class TableBoxes(Boxes[str]):
-    """One table as boxes of its test variables' keys, in declared order; of a word that is taken apart, of its parts.
+    """One table as boxes of its test variables' keys, in declared order; a split word has a box for each of its parts.
 
     Attributes:
         kinds: Of every variable of the program.
         least: The least input, in declared order.
-        words: The words that are taken apart.
+        words: The words that are split into parts.
     """
 
     kinds: Mapping[str, Scalar] = field(kw_only=True)
@@ -68,7 +68,7 @@ class TableBoxes(Boxes[str]):
 
     @classmethod
     def of(cls, program: Program, table: Table, words: Words | None = None) -> "TableBoxes":
-        """The table's boxes; all its tests must be boxes, those of the words boxes of their parts."""
+        """Build the table's boxes. All its tests must be boxes, and those of split words boxes of their parts."""
         split = words or {}
         kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
         extents: dict[str, tuple[int, int]] = {}
@@ -83,7 +83,7 @@ class TableBoxes(Boxes[str]):
         return cls(extents, list(lines_of(table, split)), kinds=kinds, least=least, words=split)
 
     def both(self, first: int, second: int) -> Overlap:
-        """The overlap of two lines: its least witness, and the whole region where both match."""
+        """Return the overlap of two lines: its least witness, and the whole region where both match."""
         region = common(self.lines[first], self.lines[second])
         assert region is not None  # they overlap
         return Overlap(
@@ -91,7 +91,7 @@ class TableBoxes(Boxes[str]):
         )
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
-        """The values of these keys; the least of every other variable."""
+        """Return the witness with these keys; every other variable has its least value."""
         values = dict(self.least)
         for name, key in keys.items():
             if name in values:
@@ -108,15 +108,15 @@ class TableBoxes(Boxes[str]):
         return sum(keys.get(part.name, 0) << part.low for part in parts)
 
     def narrowed(self, region: Mapping[str, Box]) -> Region:
-        """Leave out variables that may have any key."""
+        """Return the region without the variables that may have any key."""
         extents = self.extents
         return {name: box for name, box in region.items() if len(box) != 1 or box[0] != extents[name]}
 
     def gap(self, disjoint: bool, most: int = MOST_GAPS) -> Gap | None:
-        """Find what no line matches: up to `most` witnesses with regions, and the count if lines are disjoint.
+        """Find the gap: up to `most` witnesses with regions, and the count of inputs where it is exact.
 
         Raises:
-            BudgetError: Whether there is anything was not found out.
+            BudgetError: The search ended before it was known whether there is a gap.
         """
         search = Gaps.of(self, disjoint=disjoint)
         missing = search.missing()
@@ -141,7 +141,7 @@ class TableBoxes(Boxes[str]):
         return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count, patterns)
 
     def _idle(self) -> int:
-        """How many inputs are alike to every line, as they differ in bits that none looks at."""
+        """Count the inputs that no line tells from a given one: they differ only in bits that no line reads."""
         looked_at = {name for line in self.lines for name in line}
         apart = {part.name for parts in self.words.values() for part in parts}
         return prod(high + 1 for name, (_, high) in self.extents.items() if name in apart - looked_at)

@@ -14,7 +14,7 @@ _MOST = 8
 
 
 def cell(kind: Scalar, box: Box) -> str | None:
-    """The cell that states `box`; "" where it is everything, None where no cell can."""
+    """Spell the cell that states `box`: "" for the whole range, None where no cell can say it."""
     low, high = key_bounds(kind)
     if box == ((low, high),):
         return ""
@@ -46,7 +46,7 @@ def cell(kind: Scalar, box: Box) -> str | None:
 
 
 def condition(name: str, kind: Scalar, box: Box) -> str:
-    """`name` and its keys as a condition, for people."""
+    """Spell `name` and its keys as a condition for people."""
     text = cell(kind, box)
     if text is None:
         parts = [cell(kind, (part,)) or "" for part in box[:_MOST]]
@@ -57,7 +57,7 @@ def condition(name: str, kind: Scalar, box: Box) -> str:
 
 
 def region(kinds: Mapping[str, Scalar], boxes: Region | None) -> tuple[str, ...]:
-    """The region as conditions, one a variable that is not free; a word by the mask that it has."""
+    """Spell a region as conditions, one for each variable that it bounds; a word is shown by its mask."""
     return tuple(_conditions(kinds, boxes)) if boxes else ()
 
 
@@ -77,7 +77,7 @@ def _conditions(kinds: Mapping[str, Scalar], boxes: Region) -> Iterator[str]:
 
 
 def _by_word(kinds: Mapping[str, Scalar], names: Iterable[str]) -> dict[str, list[Part]]:
-    """The parts among the names, by their leaves."""
+    """Group the parts among the names by their leaves."""
     words: dict[str, list[Part]] = {}
     for name in names:
         part = None if name in kinds else Part.named(name)
@@ -87,13 +87,13 @@ def _by_word(kinds: Mapping[str, Scalar], names: Iterable[str]) -> dict[str, lis
 
 
 def mask(digits: str) -> str:
-    """A mask, or a number, in groups of four digits."""
+    """Write the binary digits of a mask or a number in groups of four."""
     groups = [digits[max(0, end - 4) : end] for end in range(len(digits), 0, -4)]
     return f"0b{'_'.join(reversed(groups))}"
 
 
 def inputs(kinds: Mapping[str, Scalar], boxes: Region, names: Iterable[str]) -> int:
-    """How many inputs a region has over these variables."""
+    """Count the inputs of a region over these variables."""
     whole = prod(size((key_bounds(kinds[name]),)) for name in names)
     for name, box in boxes.items():
         low, high = key_bounds(kind_of(kinds, name))
@@ -104,9 +104,9 @@ def inputs(kinds: Mapping[str, Scalar], boxes: Region, names: Iterable[str]) -> 
 def cell_under(
     column: Column, kinds: Mapping[str, Scalar], boxes: Region
 ) -> tuple[str, frozenset[str]] | None:
-    """The cell that says under a heading what the region says of its bits or its variable, and of which names that is.
+    """Return the cell that states a region's bounds on a column's bits or variable, and the names that it covers.
 
-    None where no cell says it. Bits that another column has, too, are said in each.
+    Return None where no cell says it. Bits that another column has, too, are said in each.
     """
     if column.variable in boxes:
         text = cell(kinds[str(column.variable)], boxes[str(column.variable)])
@@ -129,7 +129,7 @@ def cell_under(
 
 
 def _places(column: Column) -> Part | None:
-    """The bits that a heading shows; None for any other heading."""
+    """Return the bits that a heading shows; None for any other heading."""
     if column.subject is None:
         return None
     field = field_of(column.subject)

@@ -28,7 +28,7 @@ Shown: TypeAlias = list[Any]
 
 
 def box_certificate(program: Program, table: Table) -> Certificate:
-    """The certificate of a table without relational conditions, proved without assumptions."""
+    """Make the certificate of a table without relational conditions, proved without assumptions."""
     names = [str(name) for name in table.variables]
     types = {str(variable.name): variable.type for variable in program.variables}
     extents = {name: key_bounds(types[name]) for name in names}
@@ -45,7 +45,7 @@ def tree_certificate(
     nodes: Sequence[Node],
     assumptions: Sequence[AssumptionName],
 ) -> Certificate:
-    """The certificate of a table proved by a tree of regions under `assumptions`."""
+    """Make the certificate of a table proved by a tree of regions under `assumptions`."""
     names = [column.name for column in universe.columns]
     forms = [[list(term) for term in form] for form in universe.forms]
     return _certificate(table, names, forms, [_shown(node) for node in nodes], assumptions)
@@ -60,10 +60,10 @@ def with_witness(certificate: Certificate, program: Program, table: Table, witne
 
 
 def program_certificate(program: Program, tables: Iterable[Certificate]) -> Certificate:
-    """All certificates of a program.
+    """Join the certificates of a program's tables into one document.
 
     Args:
-        program: What was proved, with the assumptions that stop its tables.
+        program: The program proved, with the assumptions that stop its tables.
         tables: One certificate a table.
     """
     stops = {table.name: list(table.stops) for table in program.tables}
@@ -79,7 +79,7 @@ def program_certificate(program: Program, tables: Iterable[Certificate]) -> Cert
 
 
 def must_cover(table: Table) -> bool:
-    """Whether some line must match every input: there is no DEFAULT, or it is declared unreachable."""
+    """Return whether some line must match every input: there is no DEFAULT, or it is declared unreachable."""
     return table.default is None or table.default.unreachable
 
 
@@ -124,7 +124,7 @@ def _renumbered(node: Shown, number: Mapping[int, int]) -> Shown:
 
 
 def _tests(table: Table, extents: Mapping[str, tuple[int, int]]) -> Iterator[Test]:
-    """Every distinct condition that says anything."""
+    """Yield every distinct test that restricts its variable."""
     distinct = {id(test): test for line in table.lines for test in line.tests if test is not None}
     return (test for test in distinct.values() if test.box != (extents[test.variables[0]],))
 
@@ -132,7 +132,7 @@ def _tests(table: Table, extents: Mapping[str, tuple[int, int]]) -> Iterator[Tes
 def _box_lines(
     table: Table, extents: Mapping[str, tuple[int, int]], names: Sequence[str]
 ) -> list[dict[int, Box]]:
-    """The lines that can match, as boxes by column."""
+    """Return the lines that can match, as boxes by column."""
     telling = {id(test) for test in _tests(table, extents)}
     lines = []
     for line in table.lines:

@@ -18,7 +18,7 @@ from rcsc.proof.table.verdict import Gap, Overlap, TableFinding, Undecided, refu
 
 
 def shown(program: Program, table: Table) -> list[Variable]:
-    """The variables of a witness, in declared order: what the table or its assumptions read."""
+    """Return the variables of a witness, in declared order: those that the table or its assumptions read."""
     assumed = (a.condition for a in program.assumptions if a.name in table.assumptions)
     wanted = set(table.variables).union(*map(read_by, assumed))
     return [variable for variable in program.variables if variable.name in wanted]
@@ -40,7 +40,7 @@ class TableSolver:
         self._tests: dict[int, Term] = {}
 
     def line(self, at: int) -> Term:
-        """State that a line matches."""
+        """Return the term that a line matches."""
         if at not in self._lines:
             self._lines[at] = smt.all_of(
                 [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
@@ -53,13 +53,13 @@ class TableSolver:
         return self._tests[key]
 
     def none(self) -> Term:
-        """State that no line matches."""
+        """Return the term that no line matches."""
         return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
 
     def witness(self, *terms: Term, spare: smt.Budget | None = None) -> Snapshot | None:
-        """The least input for which the terms hold; None where the solver gives up.
+        """Return the least input for which the terms hold; None where the solver gives up.
 
-        `spare`, where there is one, is what may be spent to find the least once some input is known.
+        `spare`, if given, is the budget for finding the least one once some input is known.
         """
         self.solver.push()
         self.solver.add(*terms)
@@ -68,7 +68,7 @@ class TableSolver:
         return witness
 
     def holds(self, *terms: Term) -> Answer:
-        """Whether the terms can hold together."""
+        """Ask whether the terms can hold together."""
         return self.solver.check(*terms)
 
 
@@ -79,7 +79,7 @@ _STEPS = 20_000_000
 
 
 class Agreement(Enum):
-    """What Z3 says of the verdict."""
+    """Z3's answer about the verdict."""
 
     AGREES = auto()
     DISAGREES = auto()
@@ -88,7 +88,7 @@ class Agreement(Enum):
 
 
 def worth_asking(table: Table, options: Options) -> bool:
-    """Whether Z3 is to be asked, by what it should cost."""
+    """Return whether to ask Z3: by the option, else by the estimated cost."""
     if options.solver == "both":
         return True
     cells = sum(1 for line in table.lines for test in line.tests if test is not None)
@@ -98,7 +98,7 @@ def worth_asking(table: Table, options: Options) -> bool:
 def confirm(
     program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
 ) -> Agreement:
-    """Compare the findings with Z3's answers: do two lines overlap, and is there a gap?"""
+    """Compare the findings with Z3's answers to two questions: do two lines overlap, and is there a gap?"""
     if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
         return Agreement.NOT_ASKED
     if smt.gives_up(
@@ -123,7 +123,7 @@ def confirm(
 
 
 def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
-    """Whether no line matches some input: first at one that was found, which costs little, as values are put in."""
+    """Ask whether no line matches some input. Gaps already found are tried first: with their values put in, that costs little."""
     for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
         named = [v for v in shown(asked.program, asked.table) if v.name in witness]
         point = [(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name])) for v in named]
@@ -134,7 +134,7 @@ def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
 
 
 def _some_overlap(asked: TableSolver) -> Answer:
-    """Whether two lines can match at once: each line against all before it."""
+    """Ask whether two lines can match at once, by asking of each line together with all before it."""
     terms = []
     seen = smt.truth(False)
     from rcsc.lang.model import Bool

@@ -42,7 +42,7 @@ _MOST_CLASSES = 64
 
 
 class UndecidedError(Exception):
-    """The solver gave up; what it was asked."""
+    """The solver gave up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +83,13 @@ class Space:
     # --- single questions ---
 
     def solver(self, *nodes: Node) -> Solver:
-        """A solver that knows the domain, what is given, and these."""
+        """Return a solver that has asserted the domain, the given conditions, and these nodes."""
         solver = Solver(self.options.limits)
         solver.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
         return solver
 
     def possible(self, *nodes: Node) -> bool:
-        """Whether all of them can hold together.
+        """Return whether all nodes can hold together.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -101,7 +101,7 @@ class Space:
         return self.answered(self._plain, *map(values.term_of, nodes))
 
     def answered(self, solver: Solver, *terms: Term) -> bool:
-        """Whether what the solver knows can hold together with the terms.
+        """Return whether the terms can hold together with all that the solver has asserted.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -121,7 +121,7 @@ class Space:
         return self._least(self.solver(*nodes))
 
     def _least(self, solver: Solver, spare: smt.Budget | None = None) -> dict[str, Value]:
-        """The least input; any one where `spare` is spent."""
+        """Return the least input, or any input once `spare` is spent."""
         before = solver.queries
         least = least_witness(solver, self.variables, self.frame, spare)
         self.queries += solver.queries - before
@@ -130,7 +130,7 @@ class Space:
         return least
 
     def volume(self, names: Iterable[str]) -> int | None:
-        """How many values the variables can have together; None where one is real."""
+        """Count the joint values of the variables; None where one is real."""
         kinds = [self.nodes[name].kind for name in names]
         if any(isinstance(kind, Real) for kind in kinds):
             return None
@@ -139,7 +139,7 @@ class Space:
     # --- boxes ---
 
     def cover(self, wanted: Node, allowed: Node, most: int, spare: smt.Budget) -> Cover:
-        """Cover `wanted` with at most `most` boxes within `allowed`; with one that need not be wide where `spare` is spent.
+        """Cover `wanted` with at most `most` boxes within `allowed`; once `spare` is spent, with one box that need not be maximal.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -252,24 +252,24 @@ class Space:
 
 
 def _meet(left: Mapping[str, Box], right: Mapping[str, Box]) -> bool:
-    """Whether two boxes over the same variables have an input in common."""
+    """Return whether two boxes over the same variables have an input in common."""
     return all(meet(part, right[name]) for name, part in left.items())
 
 
 def _classes(starts: list[int], last: int) -> list[tuple[int, int]]:
-    """The classes that begin at the starts."""
+    """Return the classes that begin at the starts."""
     return [(low, high - 1) for low, high in pairwise([*starts, last + 1])]
 
 
 def _within(starts: list[int], part: Box) -> list[tuple[int, int]]:
-    """The classes in a part of the variable's values, which cuts no class."""
+    """Return the classes in a part of the variable's values; the part's ends cut no class."""
     edges = sorted({*(start for start in starts), *(low for low, _ in part), *(high + 1 for _, high in part)})
     pairs = [(low, high - 1) for low, high in pairwise(edges)]
     return [pair for pair in pairs if holds(part, pair[0])]
 
 
 def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]) -> Box:
-    """Join the class of `at` with others that fit; where it does not fit, stretch `at`."""
+    """Join the class of `at` with others that fit; where that class itself does not fit, stretch `at` within it."""
     home = next(interval for interval in classes if interval[0] <= at <= interval[1])
     if not fits((home,)):
         return (_stretched(at, home, fits),)
@@ -289,7 +289,7 @@ _PLAIN = {*COMPARISONS, Op.NOT, Op.AND, CONSTANT, VARIABLE, NARROWED}
 
 
 def _conjuncts(condition: Node) -> Iterator[Node]:
-    """The conditions that it joins by `and`."""
+    """Yield the conditions that this one joins by `and`."""
     waiting = [condition]
     while waiting:
         node = waiting.pop()
@@ -300,7 +300,7 @@ def _conjuncts(condition: Node) -> Iterator[Node]:
 
 
 def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:
-    """Return the keys at which a class of equivalent values begins, by variable, from constants."""
+    """Return the keys at which a class of equivalent values begins, by variable, found from the constants compared."""
     starts = {name: {key_bounds(node.kind)[0]} for name, node in nodes.items()}
     for node in values.parts_first(condition):
         if node.op in COMPARISONS:

@@ -56,7 +56,7 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
 
 
 def _certificate(program: Program, table: Table, options: Options) -> "Mapping[str, object] | None":
-    """The certificate of a table of boxes that is right; one with words taken apart is a tree of regions for the checker."""
+    """Make the certificate of a proved table of boxes; one that splits words gets a tree of regions, for the checker."""
     if boxes.applies(table):
         return box_certificate(program, table)
     from rcsc.proof.table.relational import certificate_alone
@@ -79,13 +79,13 @@ def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFindin
 
 
 def _narrows(program: Program, table: Table) -> bool:
-    """Whether an assumption reads what the table's conditions read."""
+    """Return whether an assumption reads a variable that the table's conditions read."""
     assumed = [assumption for assumption in program.assumptions if assumption.name in table.assumptions]
     return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
 
 
 def _wrong(table: Table, findings: tuple[TableFinding, ...]) -> bool:
-    """Whether anything is found but inputs that a DEFAULT line takes."""
+    """Return whether there is any finding besides gaps that a DEFAULT line takes."""
     return any(not isinstance(finding, Gap) or must_cover(table) for finding in findings)
 
 

@@ -67,7 +67,7 @@ MANY = 3
 def diagnostics(
     program: Program, verdict: TableVerdict, options: Options, unproved: Collection[str] = ()
 ) -> list[Diagnostic]:
-    """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
+    """Turn a verdict's findings into diagnostics; `unproved` names the invariants and assumptions whose proof failed."""
     table = verdict.table
     few = min(WRONG_STEPS, options.together)
     with smt.together(few, of_all=True):
@@ -156,7 +156,7 @@ def _others(
 
 
 def _lower(table: Table) -> list[Diagnostic]:
-    """Show what `above` and `same` come to, line by line."""
+    """Spell out the tests that `above` and `same` come to, line by line."""
     lower = [line for line in table.lines if line.below or line.same]
     if not lower:
         return []
@@ -210,7 +210,7 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
 
 
 def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
-    """What dead lines and a dead DEFAULT may rest on."""
+    """Name the assumptions that a dead line or a dead DEFAULT may rest on."""
     names = ", ".join(f"`{name}`{' (not proved)' if name in unproved else ''}" for name in table.assumptions)
     return (f"under {names}",) if names else ()
 
@@ -244,7 +244,7 @@ def _overlap(program: Program, partings: Partings, overlap: Overlap, options: Op
 def _proposals(
     table: Table, lines: tuple[Line, Line], repair: PartingCell | None, effects: Effects | None
 ) -> tuple[Proposal, ...]:
-    """What would mend an overlap: a cell that parts the lines, or that they do the same."""
+    """Propose repairs of an overlap: a cell that parts the lines, or the declaration that they do the same."""
     first, second = lines
     proposals = []
     if repair is not None:
@@ -262,7 +262,7 @@ def _proposals(
 
 
 def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tuple[Label, ...]:
-    """Point at the cell that the help changes, where it stands far from the names of both lines."""
+    """Return a label for the cell that the help changes, where it stands far from the names of both lines."""
     if repair is None:
         return ()
     cell = table.lines[repair.line].cell_span(repair.column)
@@ -271,7 +271,7 @@ def _far(table: Table, lines: Sequence[Line], repair: PartingCell | None) -> tup
 
 
 def _effects(program: Program, table: Table, overlap: Overlap, options: Options) -> Effects | None:
-    """What two lines that overlap do; None where that is left for later."""
+    """Compare the effects of two overlapping lines; None where that is left for later."""
     if options.brief:
         smt.leave_open("whether two lines do the same")
         return None
@@ -290,7 +290,7 @@ def _most_overlapping(table: Table, overlaps: Sequence[Overlap]) -> str:
 
 
 def _together(partings: Partings, overlaps: Sequence[Overlap]) -> Proposal | None:
-    """Propose the repairs of several overlaps together, or say what they leave; None for fewer than two."""
+    """Propose the repairs of several overlaps together, or tell the errors they would leave; None for fewer than two."""
     program, table = partings.program, partings.table
     first = [next(iter(partings.cells(overlap)), None) for overlap in overlaps]
     chosen = [cell for cell in first if cell is not None and not cell.falls]
@@ -352,7 +352,7 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
 
 
 def _adding(table: Table, row: NewLine) -> Proposal:
-    """Propose a line for a gap; what it does is left to be written."""
+    """Propose a line for a gap; its actions are left to be written."""
     which = "all" if row.closes else "some"
     title = f"add a line to table `{table.name}` for {which} of the inputs that no line matches"
     proved = "it closes the gap" if row.closes else "it closes this part of the gap"
@@ -369,7 +369,7 @@ def _patterns(gap: Gap) -> tuple[str, ...]:
 
 
 def _more(program: Program, gap: Gap) -> int:
-    """Count the gap's inputs outside the regions shown; 0 where nobody counted."""
+    """Count the gap's inputs outside the regions shown; 0 where they were not counted."""
     if gap.count is None:
         return 0
     return max(0, gap.count[0] - sum(inputs or 1 for inputs in _inputs(program, gap)))

@@ -41,7 +41,7 @@ STEPS_OF_A_CELL = 60
 
 
 class Outcome(Enum):
-    """What comes of a proposal."""
+    """The outcome of trying a proposal."""
 
     HOLDS = auto()
     FAILS = auto()
@@ -49,25 +49,25 @@ class Outcome(Enum):
 
 
 class Remembers(Protocol):
-    """What an earlier trial in the same process leaves, for who checks one text after another."""
+    """Outcomes of earlier trials in this process, for a caller that checks one text after another."""
 
     def outcome(
         self, program: Program, table: Table, proposal: Proposal, make: Callable[[], Outcome]
     ) -> Outcome:
-        """Return what came of the proposal for an equal table of an equal rest of the program, else try it."""
+        """Return the kept outcome for an equal table in an equal rest of the program, else try the proposal."""
 
 
 def mended(
     verdict: ProgramVerdict, root: str, loaded: Loaded, options: Options, known: Remembers | None = None
 ) -> tuple[Diagnostic, ...]:
-    """Return the findings of a verdict, each proposal tried.
+    """Return a verdict's findings after trying each proposal.
 
     Args:
         verdict: Of the program that `root` resolves to.
         root: The file that was checked.
         loaded: All texts.
         options: Limits of a trial, and of all together.
-        known: What is remembered of earlier ones.
+        known: Outcomes of earlier trials.
     """
     if not any(finding.proposals for finding in verdict.findings):
         return verdict.findings
@@ -80,7 +80,7 @@ def mended(
 
 
 def _tried(finding: Diagnostic, trials: "_Trials") -> Diagnostic:
-    """The finding with the proposals that hold, and in its helps and notes what came of each."""
+    """Return the finding with only the proposals that did not fail; its helps and notes tell each outcome."""
     kept: list[Proposal] = []
     said: dict[str, str] = {}
     for proposal in finding.proposals:
@@ -107,7 +107,7 @@ COUNTED = {Code.GAP, Code.DEFAULT_REACHED}
 
 
 def key(finding: Diagnostic) -> tuple[str, str]:
-    """Return what a finding is about, whatever it counts."""
+    """Return the key by which findings before and after are compared; counts do not enter it."""
     counts = finding.code in COUNTED or finding.only_listed
     table = next((witness.table for witness in finding.witnesses), "")
     return finding.code.value, table if counts else finding.message
@@ -115,7 +115,7 @@ def key(finding: Diagnostic) -> tuple[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """What is wrong with a table, by names, that one version of it can be compared with another.
+    """The errors of a table, by names, so that one version of it can be compared with another.
 
     Attributes:
         pairs: Lines that overlap.
@@ -134,7 +134,7 @@ class Wrong:
 
     @classmethod
     def of(cls, verdict: TableVerdict) -> "Wrong":
-        """Return what a verdict says."""
+        """Collect a verdict's errors by name."""
         lines, pairs, dead, gaps = verdict.table.lines, set[frozenset[str]](), set[str](), list[Gap]()
         whole = True
         for each in verdict.findings:
@@ -152,20 +152,20 @@ class Wrong:
         return cls(frozenset(pairs), frozenset(dead), bool(gaps), left, not must_cover(verdict.table), whole)
 
     def within(self, other: "Wrong") -> bool:
-        """Whether nothing is wrong that is not so in another, no more inputs are left, and a DEFAULT is still reached."""
+        """Return whether every error is also one of the other version, no more inputs are left, and a DEFAULT is still reached."""
         fewer = self.left is None or other.left is None or self.left <= other.left
         gap = self.gap <= other.gap and (not self.falls or self.gap == other.gap)
         return self.pairs <= other.pairs and self.dead <= other.dead and gap and fewer
 
 
 def written(root: str, loaded: Loaded, file: str, proposal: Proposal) -> Program | None:
-    """Return the program of the texts once a proposal stands in one of them; None where there is none.
+    """Return the program once a proposal is written into its text; None where the text then makes no program.
 
     Args:
         root: The file that is resolved.
         loaded: All texts.
         file: Where the table stands.
-        proposal: What is written.
+        proposal: The changes to write.
     """
     source = loaded.sources.get(file)
     text = None if source is None else with_proposal(source, proposal)
@@ -173,7 +173,7 @@ def written(root: str, loaded: Loaded, file: str, proposal: Proposal) -> Program
 
 
 def of_text(root: str, loaded: Loaded, new: Source) -> Program | None:
-    """Return the program of the texts with a new one in place of its file's; None where there is none."""
+    """Return the program once a new text replaces its file's; None where the text then makes no program."""
     parsed = parse(new)
     if not isinstance(parsed, tree.File):
         return None
@@ -198,12 +198,12 @@ class _Trials:
     before: dict[str, Wrong] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Note what was wrong before."""
+        """Record the errors before any trial."""
         self.told = {key(each) for each in serious(self.verdict.findings)}
         self.before = {str(each.table.name): Wrong.of(each) for each in self.verdict.tables}
 
     def outcome(self, finding: Diagnostic, proposal: Proposal) -> Outcome:
-        """Say what comes of a proposal; nothing is tried past the budget."""
+        """Try a proposal and return the outcome; nothing is tried past the budget."""
         table = next((each for each in self.verdict.program.tables if each.name == proposal.table), None)
         if table is None:
             return Outcome.OPEN
@@ -232,7 +232,7 @@ class _Trials:
         return self._compared(finding, proposal, after)
 
     def _compared(self, finding: Diagnostic, proposal: Proposal, after: ProgramVerdict) -> Outcome:
-        """Whether the finding is gone, and no other has come."""
+        """Compare the verdicts before and after: the finding must be gone, and no new one have come."""
         [table] = [each for each in after.tables if each.table.name == proposal.table]
         was, now = self.before.get(proposal.table), Wrong.of(table)
         elsewhere = {key(each) for each in serious(after.findings)} - self.told
@@ -261,15 +261,15 @@ class _Trials:
 
 
 class Silent(Nothing):
-    """Nothing is known, and nobody is told: what is wrong with a table is taken from its verdict."""
+    """A store that knows nothing and makes no diagnostics; a table's errors are taken from its verdict."""
 
     def told(self, _verdict: TableVerdict, _unproved: frozenset[str], _make: object) -> list[Diagnostic]:
-        """Say nothing."""
+        """Return no diagnostics."""
         return []
 
 
 def _matches_one(program: Program, table: Table, witness: WitnessColumn) -> bool:
-    """Whether exactly one line matches an input that none did."""
+    """Return whether exactly one line matches the witness of a gap."""
     kinds = {str(each.name): each.type for each in program.variables}
     values = zip(witness.variables, witness.values, strict=True)
     try:

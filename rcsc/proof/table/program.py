@@ -47,10 +47,10 @@ class ProgramVerdict:
         proved: Set only when there is no error.
         tables: One verdict a table.
         tally: How the obligations of procedures and conditions were settled.
-        program: What was proved, with the stopping assumptions of the tables that were looked at.
+        program: The program proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
-        unsafe: Tables with a line that owes what is not shown.
-        unmet: Pairs of lines that are said to match together, of which nobody could tell whether they ever do.
+        unsafe: Tables with a line that has an obligation not shown.
+        unmet: Pairs of lines declared to match together, of which it stayed open whether they ever do.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -64,7 +64,7 @@ class ProgramVerdict:
 
     @property
     def certificate(self) -> Mapping[str, object] | None:
-        """For all tables, made where it is asked for: it digests the whole program. None where something is not proved."""
+        """The certificate of all tables; None where something is not proved. Made on demand, as it digests the whole program."""
         if self.proved is None:
             return None
         tables = [verdict.certificate for verdict in self.tables if verdict.certificate is not None]
@@ -72,28 +72,28 @@ class ProgramVerdict:
 
 
 class Known(Protocol):
-    """What an earlier proof in the same process leaves, for who proves one text after another."""
+    """Results of an earlier proof in this process, for a caller that proves one text after another."""
 
     def verdict(self, program: Program, table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
-        """Return the verdict on a table of an equal program but for the other tables, else a new one."""
+        """Return the kept verdict of a program that is equal but for its other tables, else a new one."""
 
     def told(
         self, verdict: TableVerdict, unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
     ) -> list[Diagnostic]:
-        """Return the diagnostics of that verdict, else new ones."""
+        """Return the kept diagnostics of that verdict, else new ones."""
 
 
 class Nothing:
-    """Nothing is known: all is made anew."""
+    """A store that knows nothing: everything is made anew."""
 
     def verdict(self, _program: Program, _table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
-        """Make it."""
+        """Decide anew."""
         return make()
 
     def told(
         self, _verdict: TableVerdict, _unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
     ) -> list[Diagnostic]:
-        """Make them."""
+        """Make the diagnostics anew."""
         return make()
 
 
@@ -145,7 +145,7 @@ def prove_program(
 
 
 def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str]:
-    """Return invariants, and assumptions declared `proved`, whose proof these findings break.
+    """Return the invariants, and the assumptions declared `proved`, whose proof these findings break.
 
     Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
     error breaks it. An assumption that is proved rests on the invariants.
@@ -163,14 +163,14 @@ def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str
 
 
 def _met(program: Program, verdict: TableVerdict, options: Options) -> Met:
-    """Prove what a table says of pairs of its lines; soon, where something else is wrong with it."""
+    """Prove the table's declarations about pairs of its lines, within a small budget where something else is wrong with it."""
     soon = options.few if verdict.refuted else options
     with smt.together(soon.steps if verdict.refuted else soon.together, of_all=verdict.refuted):
         return met(program, verdict.table, soon)
 
 
 def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
-    """Rest the verdict on every invariant, unless ranges alone show its conditions to be defined."""
+    """Make the verdict rest on every invariant, unless ranges alone show its conditions to be defined."""
     if not program.invariants or defined_alone(program, verdict.table):
         return verdict
     named = dict(verdict.backing.assumptions)
@@ -182,7 +182,7 @@ def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
 def _with_assumptions(
     program: Program, verdict: TableVerdict, relied: Mapping[TableName, Collection[AssumptionName]]
 ) -> TableVerdict:
-    """Rest the verdict on what is needed to show that lines do the same, too."""
+    """Make the verdict rest also on the assumptions needed to show that lines do the same."""
     needed = relied.get(verdict.table.name, ())
     if not needed:
         return verdict
@@ -194,7 +194,7 @@ def _with_assumptions(
 def _verdicts(
     program: Program, tables: list[Table], options: Options, undefined: Collection[str], known: Known
 ) -> tuple[TableVerdict, ...]:
-    """Each table's verdict, in order; in processes where there are several tables and jobs."""
+    """Return each table's verdict, in order; several tables are decided in processes where the options allow several jobs."""
     defined = [table for table in tables if table.name not in undefined]
     if options.jobs > 1 and len(defined) > 1:
         verdicts = _in_processes(program, defined, options)

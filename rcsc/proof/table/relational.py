@@ -89,18 +89,18 @@ class Decided:
 
 
 class _OverError(Exception):
-    """Nobody waits for the region that is grown (`smt.gives_up`)."""
+    """The growing of a region was given up, as nobody waits for it (`smt.gives_up`)."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A finding, and the region around its input, where one is to be grown: that takes longest, and is done last."""
+    """A finding, with how to grow the region around its input. Growing takes longest, and is done last."""
 
     finding: TableFinding
     grow: Callable[[], Region | None] | None = None
 
     def grown(self) -> TableFinding:
-        """The finding with its region."""
+        """Return the finding with its region."""
         match self.finding:
             case Overlap() if self.grow is not None:
                 return replace(self.finding, region=self.grow())
@@ -111,16 +111,16 @@ class _Found:
 
 
 def decide(program: Program, table: Table, options: Options) -> Decided:
-    """Decide the table under its assumptions: at first with few steps, which tell most of what is wrong with one that is.
+    """Decide the table under its assumptions, at first with few steps: these show most errors of a table that has some.
 
-    Only where they tell nothing, and leave something open, it is decided anew, with all of them.
+    Only where they show none, and leave something open, it is decided anew, with all steps.
     """
     soon = _Decision(program, table, options, few=True).decided()
     return soon if settles(table, soon.findings) else _Decision(program, table, options).decided()
 
 
 def certificate_alone(program: Program, table: Table, options: Options) -> Mapping[str, object] | None:
-    """Return the certificate of a table that is right without assumptions, as a tree of regions; None where there is none."""
+    """Return a tree of regions that proves the table without assumptions; None where none was found."""
     decision = _Decision(program, table, options)
     search = decision.search((), alone=True)
     if not search.proved:
@@ -131,7 +131,7 @@ def certificate_alone(program: Program, table: Table, options: Options) -> Mappi
 def under_assumptions(
     program: Program, table: Table, options: Options, settled: tuple[TableFinding, ...]
 ) -> tuple[TableFinding, ...]:
-    """Find, under the assumptions of a table that is right without them, dead lines and what DEFAULT takes.
+    """Find, under the assumptions of a table that is right without them, dead lines and the gap that DEFAULT takes.
 
     Args:
         program: Where the assumptions are declared.
@@ -149,9 +149,9 @@ class _Decision:
     Attributes:
         universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
         clauses, assumed: The lines, and the assumptions as formulas.
-        few: Whether it is to be answered soon, or something is known to be wrong, so that the verdict stands.
-        spare: What may then be spent on the least inputs, the regions around them and more of the same kind.
-        rest: What may then be spent on what else there is, gaps and dead lines; what has no answer is told as undecided.
+        few: Whether an answer is wanted soon, or an error is known, so that the verdict stands.
+        spare: The budget then left for the least inputs, the regions around them and more of the same kind.
+        rest: The budget then left for gaps and dead lines; a question without an answer is told as undecided.
     """
 
     def __init__(self, program: Program, table: Table, options: Options, *, few: bool = False) -> None:
@@ -171,9 +171,9 @@ class _Decision:
 
     @property
     def tried(self) -> tuple[tuple[Snapshot, frozenset[int]], ...]:
-        """Sample inputs that the assumptions allow, and the lines that match each: tried before Z3, which is slow on doubles and bits.
+        """Sample inputs that the assumptions allow, with the lines that match each; none where the budget is spent.
 
-        None where nothing is left to be spent.
+        They are tried before Z3, which is slow on doubles and bits.
         """
         if self._tried is None:
             lines = self.table.lines
@@ -186,7 +186,7 @@ class _Decision:
         return self._tried
 
     def samples(self) -> Iterator[Snapshot]:
-        """Yield inputs, then some that lines, and pairs of them, are likely to match: a mask of a word matches few others."""
+        """Yield inputs, then some that lines, and pairs of them, are likely to match: few others match a mask of a word."""
         random = Random(0)  # noqa: S311  # a sample, not a secret
         points = list(trial.points(self.program.variables))
         nodes = sum(
@@ -206,7 +206,7 @@ class _Decision:
             yield trial.towards(random.choice(points), [*one, *other], kinds, random)
 
     def allowed(self, snapshot: Snapshot) -> frozenset[int] | None:
-        """The lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
+        """Return the lines that match; None where an assumption fails, or a line's condition is undefined."""
         names = self.table.assumptions
         if not all(
             fold(assumption.condition, snapshot)
@@ -221,7 +221,7 @@ class _Decision:
 
     @cached_property
     def ready(self) -> dict[int, trial.Ready]:
-        """Each test of the lines, to be tried."""
+        """The tests of the lines, prepared for trials."""
         return {id(test): trial.ready(test.condition) for test in self.table.distinct_tests}
 
     @cached_property
@@ -231,14 +231,14 @@ class _Decision:
         return any(not fewest <= len(found) <= 1 for _, found in self.tried)
 
     def tried_by(self, *lines: int) -> list[Snapshot]:
-        """The sample inputs that all these lines match; without one those that none matches."""
+        """Return the sample inputs that all these lines match; given no line, those that none matches."""
         return [
             snapshot for snapshot, found in self.tried if (found.issuperset(lines) if lines else not found)
         ]
 
     @property
     def asked(self) -> TableSolver:
-        """Z3, made when first asked."""
+        """The table's Z3 solver, made when first asked."""
         if self._asked is None:
             self._asked = TableSolver(self.program, self.table, self.options)
         return self._asked
@@ -268,7 +268,7 @@ class _Decision:
         return Decided(findings, certificate, names if search.proved else self.table.assumptions)
 
     def under_assumptions(self, settled: tuple[TableFinding, ...]) -> tuple[TableFinding, ...]:
-        """Dead lines, and a gap that DEFAULT takes, under the assumptions."""
+        """Return dead lines, and a gap that DEFAULT takes, under the assumptions."""
         wrong = self.contradiction()
         if wrong:
             return wrong
@@ -276,7 +276,7 @@ class _Decision:
         return (*self.dead(), *gaps)
 
     def contradiction(self) -> tuple[TableFinding, ...]:
-        """Find that the assumptions contradict each other, or are undecided."""
+        """Return the finding that the assumptions contradict each other, or that this is undecided; else nothing."""
         if not self.table.assumptions:
             return ()
         possible = self.satisfiable(self.assumed)
@@ -287,7 +287,7 @@ class _Decision:
         )
 
     def narrowed_gap(self, gap: Gap) -> list[TableFinding]:
-        """The gap under the assumptions: one of its witnesses that they allow, else whatever the solver finds."""
+        """Return the gap under the assumptions: at one of its witnesses that they allow, else one that the solver finds."""
         singles = self.universe.single
         columns = {str(v.name): (v, column) for v, column in zip(self.variables, self.columns, strict=True)}
         for witness in gap.witnesses:
@@ -308,7 +308,7 @@ class _Decision:
             kept: Their positions.
             budget: How many nodes at most; by the number of lines, where none is given.
             alone: Without the solver, to the first finding.
-            covering: Without the solver, as if there were no DEFAULT: to find what it takes.
+            covering: Without the solver, as if there were no DEFAULT: to find the inputs that it takes.
         """
         return Tree(
             self.universe,
@@ -337,7 +337,7 @@ class _Decision:
         return kept, search
 
     def oracle(self, asked: Question) -> Snapshot | NoWitness:
-        """Z3's answer about a region, as the tree asks it."""
+        """Answer the tree's question about a region: by the samples, else by Z3."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
         fewest = 1 if must_cover(self.table) else 0
@@ -361,7 +361,7 @@ class _Decision:
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
     def fault(self, candidates: Sequence[int]) -> Term:
-        """State that two of the candidates match, or none does (where no DEFAULT may be reached)."""
+        """Return the term that two of the candidates match, or none does (where no DEFAULT may be reached)."""
         lines = list(map(self.asked.line, candidates))
         wrong = [smt.all_of(pair) for pair in combinations(lines, 2)]
         if must_cover(self.table):
@@ -369,18 +369,18 @@ class _Decision:
         return smt.any_of(wrong)
 
     def holds(self, *terms: Term) -> Answer:
-        """Z3's answer to what else may be wrong: with all steps, as long as nothing is."""
+        """Ask Z3 whether the terms can hold; once something is wrong, only within the rest of the budget."""
         with smt.within(self.rest) if self.few else nullcontext():
             return self.asked.holds(*terms)
 
     def model(self, z3: TableSolver) -> dict[str, Value]:
-        """The input that the solver gives, of what the table and its assumptions read."""
+        """Return the solver's input: the values of the variables that the table and its assumptions read."""
         leaves = z3.frame.leaves
         asked = (v for v in self.program.variables if v.name in leaves)
         return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in asked}
 
     def spelled(self, asked: Question) -> list[tuple[list[tuple[Expr, int]], int, int]]:
-        """The bounds of a region, their forms as sums of terms."""
+        """Return the bounds of a region, their forms as sums of terms."""
         columns, forms = self.universe.columns, self.universe.forms
         return [
             ([(columns[column].term, k) for column, k in forms[form]], low, high)
@@ -390,7 +390,7 @@ class _Decision:
     # --- findings ----------------------------------------------------------------------
 
     def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
-        """Whether the formulas can hold together, without any assumption."""
+        """Return whether the formulas can hold together, without any assumption."""
         point = find(self.universe, formulas)
         if point is NoWitness.UNKNOWN:
             given_up = smt.gives_up("whether the assumptions can hold together")
@@ -398,7 +398,7 @@ class _Decision:
         return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
     def overlaps(self, search: Search) -> list[_Found]:
-        """Every overlapping pair with its least witness."""
+        """Return every overlapping pair with its least witness."""
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.seen(seen), 2))
@@ -421,7 +421,7 @@ class _Decision:
         return found
 
     def others(self, asked: Question, known: AbstractSet[tuple[int, int]]) -> set[tuple[int, int]]:
-        """Pairs besides those known that overlap in a region: which input the solver gave of it depends on its mood."""
+        """Return further pairs that overlap in a region, so that the findings do not depend on which input the solver gave of it."""
         if smt.gives_up("which other lines overlap"):
             return set()
         z3 = self.asked
@@ -440,7 +440,7 @@ class _Decision:
         return found
 
     def covered(self, search: Search) -> bool:
-        """Whether the solver refutes that there are inputs that no line matches where the tree did not look for them."""
+        """Return whether the solver refutes that, where the tree did not look, some input is matched by no line."""
         if smt.gives_up("what no line matches"):
             return False
         if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
@@ -448,13 +448,13 @@ class _Decision:
         return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
 
     def missed(self, asked: Question) -> Answer:
-        """Whether the solver finds an input in a region that no line matches."""
+        """Ask the solver for an input in a region that no line matches."""
         z3 = self.asked
         region = [encode(condition, z3.frame) for condition in located(self.spelled(asked))]
         return self.holds(*region, smt.negation(smt.any_of(list(map(z3.line, asked.candidates)))))
 
     def matching(self, snapshot: Snapshot) -> list[int]:
-        """Positions of the lines that match; each test is looked at once.
+        """Return the positions of the lines that match; each test is evaluated at most once.
 
         Raises:
             UNDEFINED: A condition that is looked at is not defined.
@@ -479,7 +479,7 @@ class _Decision:
         return found
 
     def overlap(self, first: int, second: int, known: Point | None, *, grown: bool) -> _Found:
-        """A pair of lines that overlaps, at its least input; at the one that is known where nobody waits for the least."""
+        """Return the overlap of two lines at its least input; at the known input where nobody waits for the least."""
         if known is not None and (self.options.bare or smt.gives_up("the least input")):
             return _Found(Overlap(first, second, self.snapshot(known)))
         both = [self.line(first), self.line(second)]
@@ -500,7 +500,7 @@ class _Decision:
         return _Found(Overlap(first, second, self.snapshot(point)), grow)
 
     def gap(self, search: Search) -> list[_Found]:
-        """The least input that no line matches, if there is one; also where DEFAULT takes it."""
+        """Return the gap at the least input that no line matches, if there is one; also where DEFAULT takes it."""
         tried = self._tried is not None and bool(self.tried_by())  # in a region that was given up, perhaps
         if must_cover(self.table) and not (search.gaps or search.witnesses or tried):
             return []
@@ -558,18 +558,18 @@ class _Decision:
         return [*findings, Undecided(self.doubt(doubtful))] if doubtful else findings
 
     def doubt(self, lines: Sequence[int]) -> str:
-        """Say of which lines it is not known whether they match."""
+        """Name the lines of which it is not known whether they match."""
         names = ", ".join(f"`{self.table.lines[at].name}`" for at in lines)
         return f"whether line{'s' if len(lines) > 1 else ''} {names} can match"
 
     def meeting(self, at: int, near: Point) -> Point | NoWitness:
-        """An input that a line matches under the assumptions, looked for near another."""
+        """Find an input that a line matches under the assumptions, first near another."""
         if self.assumed:
             return find(self.universe, [self.line(at), *self.assumed], _NODES_OF_A_LINE)
         return meeting(self.universe, self.clauses[at], near, _NODES_OF_A_LINE)
 
     def excluded_only(self, at: int) -> bool:
-        """Whether a line never matches only because of an assumption that is not proved."""
+        """Return whether a line is dead only because of an assumption that is not proved."""
         assuming = len(self.sure) < len(self.assumed)
         return assuming and find(self.universe, [self.line(at), *self.sure]) is not NoWitness.NONE
 
@@ -581,7 +581,7 @@ class _Decision:
         return [formula for name, formula in names if standing[name] is Standing.PROVED]
 
     def line(self, at: int) -> Formula:
-        """A line as a formula."""
+        """Return a line as a formula."""
         return whole(self.clauses[at])
 
     def witness(
@@ -607,12 +607,12 @@ class _Decision:
     # --- witnesses ---------------------------------------------------------------------
 
     def snapshot(self, point: Point) -> dict[str, Value]:
-        """The point's values of the variables that are shown."""
+        """Return the point's values of the variables that are shown."""
         pairs = zip(self.variables, self.columns, strict=True)
         return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
 
     def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region | None:
-        """The widest box around the point in which, under the assumptions, none of `wrong` can hold; None where that is given up.
+        """Return the widest box around the point in which, under the assumptions, no formula of `wrong` can hold; None where given up.
 
         Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
         """
@@ -622,7 +622,7 @@ class _Decision:
             return None
 
     def _around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
-        """As `around`.
+        """Return the box that `around` returns.
 
         Raises:
             _OverError: It is given up.
@@ -642,14 +642,14 @@ class _Decision:
         }
 
     def excluded(self, box: Mapping[int, Bounds], formula: Formula) -> bool:
-        """Whether, under the assumptions, a formula holds nowhere in a box; first by the ends of its forms."""
+        """Return whether, under the assumptions, a formula holds nowhere in a box; the ends of its forms are tried first."""
         told = never(self.universe, box, formula)
         if told is None or (not told and self.assumed):
             return self.empty(box, formula)
         return told
 
     def empty(self, box: Mapping[int, Bounds], *formulas: Formula) -> bool:
-        """Whether no point of a box meets the assumptions and the formulas.
+        """Return whether no point of a box meets the assumptions and the formulas.
 
         Raises:
             _OverError: It is given up.
@@ -660,7 +660,7 @@ class _Decision:
         return find(self.universe, [*atoms, *self.assumed, *formulas]) is NoWitness.NONE
 
     def _possible(self, box: Mapping[int, Bounds], point: Point) -> dict[int, Bounds]:
-        """The box without values at its ends with which no input in it meets the assumptions; the point meets them."""
+        """Trim from the box's ends the values with which no input in it meets the assumptions; the point meets them."""
         narrow = dict(box)
 
         def meets(column: int, low: int, high: int) -> bool:

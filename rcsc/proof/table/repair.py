@@ -65,8 +65,8 @@ class PartingCell:
 
     Attributes:
         line: The line with the cell, by position; `other`, the line that then runs where both matched.
-        column: Where the cell stands, by position; `name`, of what it takes fewer keys: a variable, or bits of a word.
-        text: The cell as it would be; `box`, the keys that it takes.
+        column: The cell's column, by position; `name`, the variable, or bits of a word, of which it takes fewer keys.
+        text: The cell's new text; `box`, the keys that it takes.
         lost: How many keys the cell no longer takes.
         falls: Whether the line loses more than the other has, so that DEFAULT takes the rest.
     """
@@ -81,7 +81,7 @@ class PartingCell:
     falls: bool
 
     def told(self, table: Table) -> tuple[str, str]:
-        """Say what to write, which line then runs, and what it does otherwise: in two pieces, between which stands whether it is proved."""
+        """Say what to write and which line then runs, in two pieces: between them stands whether it is proved."""
         line, other = table.lines[self.line], table.lines[self.other]
         does, did = ({action.heading: action.text for action in of.actions} for of in (other, line))
         headings = [heading for heading in dict.fromkeys((*did, *does)) if heading != "procedures"]
@@ -96,17 +96,17 @@ class PartingCell:
         return f"{self.write(table)}: ", f" to part the two lines; {runs}"
 
     def write(self, table: Table) -> str:
-        """Say what to write."""
+        """Say which cell to write, and where."""
         heading = table.columns[self.column].heading
         return f"in line `{table.lines[self.line].name}` write `{self.text}` under `{heading}`"
 
     def change(self, table: Table) -> Change:
-        """The change of the table's text."""
+        """Return the change of the table's text."""
         return Change(Place.CELL, str(table.lines[self.line].name), self.column, (self.text,))
 
 
 class Partings:
-    """The cells of one table that part two of its lines; what all overlaps have in common is made once."""
+    """The cells of one table that part two of its lines; facts that all overlaps share are computed once."""
 
     def __init__(self, program: Program, table: Table) -> None:
         self.program, self.table = program, table
@@ -122,7 +122,7 @@ class Partings:
         return universe, lines_of(universe, self.table), assumptions_of(universe, self.program, self.table)
 
     def best(self, overlap: Overlap) -> PartingCell | None:
-        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines so."""
+        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines and loses no input."""
         if self._boxes is None:
             return min(self._sums(overlap), key=lambda cell: cell.lost, default=None)
         cell = next(iter(self.cells(overlap)), None)
@@ -131,8 +131,8 @@ class Partings:
     def cells(self, overlap: Overlap) -> tuple[PartingCell, ...]:
         """Return each change of one cell that parts the two lines, the smallest first, those that leave inputs to DEFAULT last.
 
-        Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
-        every other variable B has all that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
+        Taking B's keys of variable v out of line A parts the two. B then matches what A loses, if on every other variable B has
+        all keys that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
         """
         decided, table = self._boxes, self.table
         if decided is None:
@@ -200,7 +200,7 @@ def _narrowed(
 
 
 def with_cells(program: Program, table: Table, changed: Sequence[PartingCell]) -> Table | None:
-    """Return the table with these cells; of one cell changed twice, what both take. None if a line would never match."""
+    """Return the table with these cells; a cell changed twice takes only keys in both. None if a line would never match."""
     lines = list(table.lines)
     for cell in changed:
         tests = list(lines[cell.line].tests)
@@ -213,7 +213,7 @@ def with_cells(program: Program, table: Table, changed: Sequence[PartingCell]) -
 
 
 def _with_cell(program: Program, old: Test | None, cell: PartingCell) -> Test | None:
-    """Return what the cell says, and what the old one says beside it of other bits; None where nothing fits."""
+    """Return the test that the new cell and the old one's other bits state; None where nothing fits."""
     part = Part.named(cell.name)
     leaf = program.variable(cell.name if part is None else part.leaf)
     if part is not None:
@@ -230,7 +230,7 @@ def _with_cell(program: Program, old: Test | None, cell: PartingCell) -> Test | 
 
 
 def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> str:
-    """Say that lines still overlap, or never match, when all these cells are changed; empty where neither is so."""
+    """Say which lines still overlap, or that one never matches, when all these cells are changed; "" where neither is so."""
     after = with_cells(program, table, changed)
     if after is None:
         return "they contradict each other: a line would never match"
@@ -243,7 +243,7 @@ def left_by(program: Program, table: Table, changed: Sequence[PartingCell]) -> s
 
 
 def changes_of(program: Program, table: Table, changed: Sequence[PartingCell]) -> tuple[Change, ...]:
-    """Return the changes of the text that all these cells are; of one changed twice what both take, none where no cell says that."""
+    """Return these cells as changes of the text; one changed twice takes only keys in both. Return none where no cell can say that."""
     after = with_cells(program, table, changed)
     if after is None:
         return ()
@@ -269,7 +269,7 @@ def changes_of(program: Program, table: Table, changed: Sequence[PartingCell]) -
 
 
 def _says(number: Expr, box: Box) -> Expr:
-    """Return the condition that a leaf, or bits of one, have one of the keys: a term an interval, however many keys it has."""
+    """Return the condition that a leaf, or bits of one, have one of the keys: one term for each interval, however many keys it has."""
     kind = number.type
 
     def compared(op: Op, key: int) -> Expr:
@@ -294,7 +294,7 @@ class NewLine:
     """A line that matches inputs which no line matches, and none that another does.
 
     Attributes:
-        cells: Those of its conditions, one for each column that is written.
+        cells: The texts of its conditions, one for each column that is written.
         closes: Whether it is proved that no input is left.
     """
 
@@ -303,7 +303,7 @@ class NewLine:
 
     @property
     def told(self) -> str:
-        """Say what it is and does."""
+        """Describe the line and whether it closes the gap."""
         what = "closes the gap" if self.closes else "closes this part of the gap"
         return f"a line `| {' | '.join(('new', *self.cells))} || ... |` {what} and overlaps no other"
 
@@ -319,7 +319,7 @@ def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:
 
 
 def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> NewLine | None:
-    """The line of a table of boxes whose cells say the region."""
+    """Return a line whose cells state the region, for a table of boxes; None where no such line parts from all others."""
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
     told = [cells.cell_under(column, kinds, region) for column in _written(table)]
     said = [cell for cell in told if cell is not None]
@@ -354,7 +354,7 @@ class _Sum:
 
     @classmethod
     def of(cls, universe: Universe, subject: Expr) -> "_Sum | None":
-        """What a heading is; None for anything else."""
+        """Return a heading as a sum; None for anything else."""
         if isinstance(subject, Read):
             return cls(subject.type, universe.single[universe.column(subject)], 1, 0)
         if not isinstance(subject.type, Int):
@@ -369,7 +369,7 @@ class _Sum:
         )
 
     def cell(self, universe: Universe, box: Box) -> str:
-        """The cell under the heading for these values of the form; empty for all, and where no cell says it."""
+        """Spell the cell under the heading for these values of the form; "" for all, and where no cell says it."""
         if not isinstance(self.kind, Int):
             return cells.cell(self.kind, box) or ""
         ends = ((universe.low[self.form], universe.high[self.form]),)
@@ -380,7 +380,7 @@ class _Sum:
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    """A cell that the witness satisfies: its column, its text, what it says, and the lines that it excludes."""
+    """A cell that the witness satisfies: its column, its text, its formula, and the lines that it excludes."""
 
     column: int
     text: str
@@ -390,10 +390,10 @@ class _Cell:
 
 @dataclass(slots=True)
 class _Row:
-    """A row being made for an input that no line matches, of what the table's own cells say and do not say.
+    """A row for an input that no line matches, made from the table's own cells and their opposites.
 
     Attributes:
-        cells: What was chosen, by column.
+        cells: The cells chosen, by column.
     """
 
     program: Program
@@ -407,18 +407,18 @@ class _Row:
     cells: dict[int, _Cell] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """States lines and assumptions."""
+        """Build the clauses of lines and assumptions."""
         self.kinds = {str(v.name): v.type for v in self.program.variables}
         self.lines = lines_of(self.universe, self.table)
         self.assumed = assumptions_of(self.universe, self.program, self.table)
 
     def apart(self, formulas: Sequence[Formula], line: int) -> bool:
-        """Whether what the formulas say excludes a line, under the assumptions."""
+        """Return whether the formulas exclude a line, under the assumptions."""
         wanted = [*formulas, whole(self.lines[line]), *map(whole, self.assumed)]
         return find(self.universe, wanted) is NoWitness.NONE
 
     def choose(self) -> bool:
-        """Choose one cell a column, that which excludes most first, until every line is excluded; whether they are."""
+        """Choose one cell a column, first the one that excludes most, until all lines are excluded; return whether they are."""
         offered = list(self.offered())
         waiting = set(range(len(self.lines)))
         while waiting:
@@ -432,7 +432,7 @@ class _Row:
         return all(self.apart(formulas, line) for line in waiting)
 
     def offered(self) -> Iterator[_Cell]:
-        """Every cell that could stand in the row, each text of a column once."""
+        """Yield every cell that could stand in the row, each text of a column once."""
         known: set[tuple[int, str]] = set()
         for at, text, formula in self._possible():
             if (at, text) in known or not text:
@@ -442,7 +442,7 @@ class _Row:
             yield _Cell(at, text, formula, frozenset(excluded))
 
     def _possible(self) -> Iterator[tuple[int, str, Formula]]:
-        """For each column what a line says there, or its opposite, as the witness has it; and what the region says."""
+        """Yield, for each column, the cells of lines, or their opposites, that the witness satisfies; and the region's cell."""
         for at, column in enumerate(_written(self.table)):
             name = column.variable
             every = dict.fromkeys(test for line in self.table.lines if (test := line.tests[at]) is not None)
@@ -456,7 +456,7 @@ class _Row:
                 yield from ((at, *said) for said in self._of_sum(column.subject, every))
 
     def _of_sum(self, subject: Expr, tests: Iterable[Test]) -> Iterator[tuple[str, Formula]]:
-        """What all sides of a sum of variables that the lines compare with constants have in common, as the witness has it."""
+        """Yield the cell that intersects, for a sum of variables, the sides of all compared constants on which the witness lies."""
         value = fold(subject, self.witness)
         heading = _Sum.of(self.universe, subject)
         if heading is None or value is None:
@@ -473,14 +473,14 @@ class _Row:
         yield heading.cell(self.universe, box), self.universe.atom(heading.form, box)
 
     def _boxes(self, name: str, boxes_: Sequence[Box]) -> Iterator[Box]:
-        """What a cell under a variable may say: the region, each line's side, and what all of these have in common."""
+        """Yield the boxes that a cell under a variable may state: the region, each line's side, and the intersection of all sides."""
         if name in self.region:
             yield self.region[name]
         yield from boxes_
         yield reduce(meet, boxes_, (key_bounds(self.kinds[name]),))
 
     def _turned(self, name: str, box: Box) -> Box:
-        """The keys that a cell takes, or the others, whichever has the witness's."""
+        """Return the keys that a cell takes, or the other keys, whichever has the witness's."""
         kind = self.kinds[name]
         return box if holds(box, key_of(kind, self.witness[name])) else complement(box, *key_bounds(kind))
 
@@ -490,7 +490,7 @@ class _Row:
         return cells.cell(kind, box) or "", self.universe.atom(form, box)
 
     def _of_condition(self, column: Column, test: Test) -> Iterator[tuple[str, Formula]]:
-        """A condition across variables as it is written, or its opposite."""
+        """Yield a condition across variables as written, or its opposite, as the witness satisfies it."""
         formula = self.universe.of(test.condition)
         truth = fold(test.condition, self.witness)
         if truth is True:
@@ -501,7 +501,7 @@ class _Row:
             yield text, negated(self.universe, formula)
 
     def closes(self) -> bool:
-        """Whether exactly one line matches every input, with this row."""
+        """Return whether, with this row, exactly one line matches every input."""
         row = clauses(cell.formula for cell in self.cells.values())
         tree = Tree(
             self.universe, [*self.lines, row], self.assumed, lambda _: NoWitness.UNKNOWN,
@@ -510,13 +510,13 @@ class _Row:
         return tree.run().proved
 
     def texts(self) -> tuple[str, ...]:
-        """The cells of the row, up to the `||`."""
+        """Return the cells of the row, up to the `||`."""
         found: Mapping[int, str] = {at: cell.text for at, cell in self.cells.items()}
         return tuple(found.get(at, "") for at in range(len(_written(self.table))))
 
 
 def _box_on(form: int, formula: Formula) -> Box | None:
-    """The values of one form for which a formula holds; None where it speaks of others, too."""
+    """Return the values of one form for which a formula holds; None where it speaks of others, too."""
     if isinstance(formula, Atom):
         return formula.box if formula.form == form else None
     boxes_ = [box for part in formula.parts if (box := _box_on(form, part)) is not None]
@@ -530,12 +530,12 @@ def _box_on(form: int, formula: Formula) -> Box | None:
 
 
 def _written(table: Table) -> list[Column]:
-    """The columns in which cells can be written; they stand before those that `above` adds."""
+    """Return the columns in which cells can be written; they stand before those that `above` adds."""
     return [column for column in table.columns if column.written]
 
 
 def _line_across(program: Program, table: Table, witness: Witness, region: Region) -> NewLine | None:
-    """The line of a table with conditions across variables, or under assumptions; proved by exact arithmetic alone."""
+    """Return a line for a table with conditions across variables or under assumptions; exact arithmetic alone proves it."""
     tests = sum(len({line.tests[at] for line in table.lines}) for at in range(len(table.columns)))
     if tests * len(table.lines) > MOST_ASKED:
         return None
@@ -544,7 +544,7 @@ def _line_across(program: Program, table: Table, witness: Witness, region: Regio
 
 
 def _opposite(text: str, condition: Expr) -> str:
-    """The cell that says the opposite of a comparison's; empty for any other, and where a side may be a NaN."""
+    """Spell the opposite of a comparison's cell; "" for any other cell, and where a side may be a NaN."""
     if not (
         isinstance(condition, Apply) and is_comparison(condition.op) and all(map(is_finite, condition.args))
     ):

@@ -33,7 +33,7 @@ class Gap:
     Attributes:
         witnesses: The least one, and the least outside the regions already shown.
         regions: Around each a region that no line matches.
-        count: How many inputs there are, and of how many; None where nobody counted.
+        count: How many inputs there are, and of how many; None where they were not counted.
         patterns: The same of the bits that some line looks at, where there are others.
     """
 
@@ -62,14 +62,14 @@ class ContradictoryAssumptions:
 
 @dataclass(frozen=True, slots=True)
 class Undecided:
-    """Nobody could tell: a time-out, exhausted memory, or a question beyond the solver."""
+    """The question stayed open: a time-out, exhausted memory, or a question beyond the solver."""
 
     what: str
 
 
 @dataclass(frozen=True, slots=True)
 class SolversDisagree:
-    """Z3 says something else: a bug in rcsc."""
+    """Z3 disagrees with the verdict: a bug in rcsc."""
 
     what: str
 
@@ -82,8 +82,8 @@ class TableVerdict:
     """The verdict on one table.
 
     Attributes:
-        findings: What is wrong; a gap too where a DEFAULT line takes it (the report tells them apart).
-        backing: What it rests on.
+        findings: The findings; a gap too where a DEFAULT line takes it (the report tells them apart).
+        backing: The method and the assumptions that it rests on.
         certificate: For `rcsc certify`; None where there is nothing to certify.
         seconds: How long it took.
     """
@@ -106,7 +106,7 @@ class TableVerdict:
 
 
 def refutes(table: Table, findings: Iterable[TableFinding]) -> bool:
-    """Whether something is wrong; a gap that DEFAULT takes is not, nor a line that an assumption excludes, nor what is left open."""
+    """Return whether something is wrong. A gap that DEFAULT takes, a line that an assumption excludes and an open question do not count."""
     falls = table.default is not None and not table.default.unreachable
     return any(
         not (isinstance(finding, Gap) and falls)
@@ -117,5 +117,5 @@ def refutes(table: Table, findings: Iterable[TableFinding]) -> bool:
 
 
 def settles(table: Table, findings: Collection[TableFinding]) -> bool:
-    """Whether more steps would change nothing of the verdict: nothing is left open, or something is wrong."""
+    """Return whether more steps could not change the verdict: nothing is left open, or something is wrong."""
     return not any(isinstance(each, Undecided) for each in findings) or refutes(table, findings)

@@ -35,13 +35,13 @@ from rcsc.lang.model import Bool, Enum, Int, Real, Variable, key_bounds
 
 
 def trace(c: CProgram, fault: Code, at: Code) -> Body:
-    """The trace of a cycle that has run no line."""
+    """Return statements that set the trace of a cycle that has run no line."""
     told = {"line": NONE, "fault": fault, "fault_at": at} | dict.fromkeys(c.names.failed, Constant(0))
     return tuple(Set(Place((name,)), value) for name, value in told.items())
 
 
 def admit_function(c: CProgram, reals: bool) -> Function:
-    """Refuses first, then admits: a refused cycle changes nothing but its trace."""
+    """Return the function that admits inputs. It refuses first: a refused cycle changes nothing but its trace."""
     inputs = [v for v in c.program.variables if v.kind is model.Kind.INPUT]
     tests = [(Name(c.names.leaves[v.name]), _refused(c, v)) for v in inputs]
     asked = [(leaf, test) for leaf, test in tests if test is not None]
@@ -65,7 +65,7 @@ def admit_function(c: CProgram, reals: bool) -> Function:
 
 
 def _refused(c: CProgram, variable: Variable) -> Code | None:
-    """A condition that an input is refused: a truth value too, where it is a byte."""
+    """Return the condition that an input is refused; a truth value can be, too, where it is a byte. None where none can be."""
     place = c.text.place(variable.name)
     if c.plan.defensive and isinstance(variable.type, Bool):
         return infix(">", place, Constant(1, "uint32_t"))
@@ -73,14 +73,14 @@ def _refused(c: CProgram, variable: Variable) -> Code | None:
 
 
 def _untested(names: Sequence[str]) -> Iterator[Line]:
-    """Which variables have no test, so that one that is lost can be told from one that nothing needs."""
+    """Yield a comment that names the variables without a test, so that a lost test can be told from one that nothing needs."""
     words = dict.fromkeys(comment(re.sub(r"\[\d+\]", "[..]", name)) for name in names)
     if words:
         yield Line(f"/* Not tested, as no value of their types is refused: {', '.join(words)}. */")
 
 
 def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
-    """A condition that a value is refused; None where none can be. A NaN satisfies no comparison."""
+    """Return the condition that a value is refused; None where none can be. A NaN satisfies no comparison."""
     kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
     if isinstance(kind, Real):
         if not clamped:
@@ -94,7 +94,7 @@ def refusal(c: CProgram, variable: Variable, place: Code) -> Code | None:
 
 
 def admitted(c: CProgram, variable: Variable, place: Code) -> Iterator[Stmt]:
-    """What admission makes of a value that is not refused: clamped, and no -0.0."""
+    """Yield the statements that admit a value which is not refused: clamp it, and replace -0.0."""
     kind, clamped = variable.type, variable.admit is model.Admit.CLAMP
     if isinstance(kind, Real):
         if clamped:
@@ -108,7 +108,7 @@ def admitted(c: CProgram, variable: Variable, place: Code) -> Iterator[Stmt]:
 
 
 def _all_admitted(c: CProgram, inputs: Sequence[Variable]) -> Iterator[Stmt]:
-    """What admission makes of the inputs; of the reals of an array in a loop, for which a compiler keeps no copies on the stack."""
+    """Yield the statements that admit the inputs; for reals of an array as a loop, so that a compiler keeps no copies on the stack."""
     for (array, kind, _), group in groupby(inputs, lambda v: (_array_of(c, v), v.type, v.admit)):
         leaves = tuple(group)
         if array and isinstance(kind, Real) and len(leaves) > 1 and leaves[0].admit is not model.Admit.CLAMP:
@@ -120,19 +120,19 @@ def _all_admitted(c: CProgram, inputs: Sequence[Variable]) -> Iterator[Stmt]:
 
 
 def _array_of(c: CProgram, variable: Variable) -> tuple[str, ...]:
-    """The place of the array whose element a leaf is; empty where it is none."""
+    """Return the path of the array of which the leaf is an element; empty for any other leaf."""
     *array, last = c.names.paths[variable.name]
     return tuple(array) if last.startswith("[") else ()
 
 
 def _beyond(c: CProgram, kind: Real, place: Code) -> Code:
-    """A condition that a real is outside its range, or no number."""
+    """Return the condition that a real is outside its range, or no number."""
     low, high = (c.text.constant(kind, end) for end in (kind.low, kind.high))
     return Prefix("!", infix("&&", infix(">=", place, low), infix("<=", place, high)))
 
 
 def _outside(c: CProgram, kind: Int | Enum, place: Code) -> list[tuple[Code, Code]]:
-    """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
+    """Return, for each end of the range that the C type exceeds, the test that a value is beyond it, and the end."""
     low, high = key_bounds(kind)
     least, greatest = type_bounds(c_type(kind))
     ends = ((least < low, "<", low), (greatest > high, ">", high))
@@ -141,7 +141,7 @@ def _outside(c: CProgram, kind: Int | Enum, place: Code) -> list[tuple[Code, Cod
 
 
 def check_function(c: CProgram) -> Function:
-    """Checks all states and outputs, and the representation of every bool; then the invariants over them."""
+    """Return the function that checks states and outputs, and the representation of every bool; then the invariants over them."""
     tests = [(Name(c.names.leaves[v.name]), _unfit(c, v)) for v in c.program.variables]
     tests += [
         (Name(name), Prefix("!", c.text.expr(invariant.condition)))
@@ -169,7 +169,7 @@ def check_function(c: CProgram) -> Function:
 
 
 def _unfit(c: CProgram, variable: Variable) -> Code | None:
-    """A condition that the place holds no value of its type; None where its C type or admission rules that out."""
+    """Return the condition that the place holds no value of its type; None where its C type or admission rules that out."""
     kind, place = variable.type, c.text.place(variable.name)
     if isinstance(kind, Bool):
         if c.plan.defensive:
@@ -186,7 +186,7 @@ def _unfit(c: CProgram, variable: Variable) -> Code | None:
 
 
 def begin_functions(c: CProgram) -> Iterator[Function]:
-    """Begin a cycle of a program that trusts no state: check, then admit."""
+    """Yield the function that begins a cycle of a program that trusts no state: check, then admit."""
     if c.plan.defensive:
         yield on_state(
             c,

@@ -37,7 +37,7 @@ from rcsc.code.emit.rendering import render
 
 
 def _view(c: CProgram) -> dict[str, object]:
-    """What the templates lay out."""
+    """Return the values that the templates lay out."""
     procedures = [procedure_function(c, procedure) for procedure in callees_first(c.program)]
     matchers = [match_function(c, table) for table in c.plan.tables]
     tables = [function for table in c.plan.tables for function in line_functions(c, table)]
@@ -80,7 +80,7 @@ def _view(c: CProgram) -> dict[str, object]:
 
 
 def emit_c(plan: Plan) -> dict[str, str]:
-    """The C files of the plan, by path below the generated folder."""
+    """Return the C files of the plan, by path below the generated folder."""
     c = _program(plan)
     view, name = _view(c), c.p
     return {
@@ -103,7 +103,7 @@ def _program(plan: Plan) -> CProgram:
 
 
 def outward(plan: Plan) -> Iterator[tuple[str, str]]:
-    """Give each name in C that others than the program's own file see, and what it is.
+    """Yield each C name that is seen outside the program's own file, with a description.
 
     Two programs that are linked, or whose headers are included together, may share only the name of an extern procedure that both
     declare alike.

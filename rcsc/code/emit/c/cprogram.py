@@ -46,11 +46,11 @@ class CProgram:
     """The C of one program, while it is made.
 
     Attributes:
-        plan: What is laid out.
-        names: What everything is called.
+        plan: The plan to lay out.
+        names: All names.
         text: Expressions and statements.
-        digest: What tells its states from those of other tables.
-        stated: By procedure, what the lines that run it state.
+        digest: The digest that tells its states from those of other tables.
+        stated: By procedure, the ranges stated by the lines that run it.
         classifiers: Functions that find the class of a value, as matching asks for them.
     """
 
@@ -73,12 +73,12 @@ class CProgram:
 
     @property
     def foreign(self) -> int:
-        """What `check` gives of a state that other tables made: the position after the last invariant's."""
+        """The result of `check` for a state that other tables made: the position after the last invariant's."""
         return len(self.program.variables) + len(self.program.invariants)
 
 
 def on_state(c: CProgram, doc: str, name: str, *body: Stmt, gives: str = "void") -> Function:
-    """A function of the state."""
+    """Return a function that takes the state."""
     return Function(doc, f"{gives} {c.p}_{name}({c.p}_t *s)", body)
 
 
@@ -93,22 +93,22 @@ def fault_name(c: CProgram, fault: Fault) -> Name:
 
 
 def assigned(c: CProgram, variable: Variable, value: model.Value) -> Set:
-    """Assign a constant to a variable."""
+    """Return the assignment of a constant to a variable."""
     return Set(c.text.place(variable.name), c.text.constant(variable.type, value))
 
 
 def discarded(name: Name) -> Do:
-    """Mark a name as not read."""
+    """Return a statement that marks a name as not read."""
     return Do(Cast("void", name))
 
 
 def touches_state(body: Body) -> bool:
-    """Whether it reads or writes the state."""
+    """Return whether the code reads or writes the state."""
     return any(isinstance(code, Place) or code == STATE for code in read(body))
 
 
 def first_of(asked: Sequence[tuple[Code, Code]]) -> Iterator[Stmt]:
-    """Leaves in `at` the position of the first test that holds; a chain of `else if` is no longer than compilers nest."""
+    """Yield code that sets `at` to the position of the first test that holds; a chain of `else if` is no longer than compilers nest."""
     for begin in range(0, len(asked), MOST_CHAINED):
         arms = tuple((test, (Set(AT, leaf),)) for leaf, test in asked[begin : begin + MOST_CHAINED])
         chain = Branch(arms, (Line("/* none of these */"),))
@@ -116,7 +116,7 @@ def first_of(asked: Sequence[tuple[Code, Code]]) -> Iterator[Stmt]:
 
 
 def counted_loop(count: Name, end: Code, *body: Stmt, bound: str) -> Frame:
-    """A loop from 0 up to the end, exclusive, with what is said of how often it runs."""
+    """Return a loop from 0 up to the end, exclusive, with a comment that bounds its runs."""
     zero, one = Constant(0, "uint32_t"), Constant(1, "uint32_t")
     step = Set(count, infix("+", count, one))
     return repeated(Set(count, zero), infix("<", count, end), step, *body, bound=bound)

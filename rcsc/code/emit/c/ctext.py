@@ -67,7 +67,7 @@ CALLED = {kind: short for short, kind in SHORT.items()}
 
 
 def c_type(kind: Scalar) -> str:
-    """The type of a leaf: the smallest that holds its range."""
+    """Return the C type of a leaf: the smallest that holds its range."""
     match kind:
         case Bool():
             return "bool"
@@ -87,12 +87,12 @@ def c_type(kind: Scalar) -> str:
 
 
 def stored_type(kind: Scalar, *, defensive: bool) -> str:
-    """The type of a leaf in the state: of a truth value a byte where any bytes may come, as a bool of them means nothing."""
+    """Return the type of a leaf in the state. Where any bytes may come, a truth value is a byte: not all bytes are a valid bool."""
     return "uint8_t" if defensive and isinstance(kind, Bool) else c_type(kind)
 
 
 def declared(names: Names, name: str, kind: model.Type, *, defensive: bool) -> str:
-    """A member's declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
+    """Spell a member's declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
     lengths = ""
     while isinstance(kind, model.Array):
         lengths += f"[{kind.length}]"
@@ -103,26 +103,26 @@ def declared(names: Names, name: str, kind: model.Type, *, defensive: bool) -> s
 
 
 def wide_type(kind: Scalar) -> str:
-    """The type in which a parameter of an extern procedure is given: a function of yours need not change with its range."""
+    """Return the type of an extern procedure's parameter: it is wide, so that a user's function need not change with the range."""
     if isinstance(kind, Int):
         return "uint64_t" if kind.low >= 0 and kind.high > I64_MAX else "int64_t"
     return "int64_t" if isinstance(kind, Enum) else c_type(kind)
 
 
 def word_type(low: int, high: int) -> str:
-    """The type in which whole numbers between these bounds are computed; never one that C would compute in another."""
+    """Return the type in which whole numbers between these bounds are computed; never one that C would promote to another."""
     if low >= 0:
         return "uint32_t" if high < 1 << 32 else "uint64_t"
     return "int32_t" if low >= -(1 << 31) and high < 1 << 31 else "int64_t"
 
 
 def local_type(kind: Scalar) -> str:
-    """The type of a parameter, a local or a loop variable."""
+    """Return the type of a parameter, a local or a loop variable."""
     return word_type(kind.low, kind.high) if isinstance(kind, Int) else c_type(kind)
 
 
 def carried(expr: Expr) -> str:
-    """The C type of the code of an expression; of a whole number as a constant, one that it fits in."""
+    """Return the C type of an expression's code; for a whole number as a constant, one that it fits in."""
     match expr:
         case model.Literal(value=value, type=Int()):
             return word_type(int(value), int(value))
@@ -137,20 +137,20 @@ def carried(expr: Expr) -> str:
 
 
 def _working(expr: model.Apply) -> str:
-    """The type in which an operation with a whole number as its result is done: it holds the bounds of operands and result."""
+    """Return the type in which a whole-numbered operation is done: it holds the bounds of operands and result."""
     return word_type(*_bounds((*expr.args, expr)))
 
 
 def _bounds(exprs: Iterable[Expr]) -> tuple[int, int]:
-    """The bounds of all whole numbers among these together."""
+    """Return the bounds of all whole numbers among these together."""
     kinds = [expr.type for expr in exprs if isinstance(expr.type, Int)]
     return min(kind.low for kind in kinds), max(kind.high for kind in kinds)
 
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
-    """What the C type of an expression can hold: a constant only itself, a double or single anything.
+    """Return the values that the C type of an expression can hold: a constant only itself, a double or single any.
 
-    Of a division or a remainder by a constant compilers know more: they compute it in the type of what is divided.
+    Of a division or a remainder by a constant compilers know more: they compute it in the type of the dividend.
     """
     if isinstance(expr, model.Literal):
         return expr.value, expr.value
@@ -165,7 +165,7 @@ def _c_bounds(expr: Expr) -> tuple[Value, Value]:
 
 
 def _decided(op: Comparison, args: tuple[Expr, ...]) -> bool | None:
-    """What a comparison always gives by the C types of its operands: compilers refuse it as a comparison."""
+    """Return the constant result of a comparison by its operands' C types, else None: compilers refuse such a comparison."""
     first, second = args
     if isinstance(first.type, Real):
         return None
@@ -185,7 +185,7 @@ def _decided(op: Comparison, args: tuple[Expr, ...]) -> bool | None:
 
 
 def _compared_in(args: Sequence[Expr]) -> str | None:
-    """The type in which whole numbers are compared; None where each may stand as it is.
+    """Return the type in which whole numbers are compared; None where each may stand as it is.
 
     C compares two types of one sign by their values, whichever is the wider.
     """
@@ -197,22 +197,22 @@ def _compared_in(args: Sequence[Expr]) -> str | None:
 
 
 def _beside(value: int, other: str) -> str:
-    """The type of a constant beside an operand of type `other`: it has its sign."""
+    """Return the type of a constant beside an operand of type `other`, with the same sign."""
     return word_type(value if other.startswith("u") else min(value, -1), value)
 
 
 def negated(code: Code) -> Code:
-    """The negation of a condition."""
+    """Return the negation of a condition."""
     return code.operand if isinstance(code, Prefix) and code.op == "!" else Prefix("!", code)
 
 
 def _joined(op: str, code: Code) -> tuple[Code, ...]:
-    """The operands of a chain of one operator."""
+    """Return the operands of a chain of one operator."""
     return code.operands if isinstance(code, Infix) and code.op == op else (code,)
 
 
 def _chain(op: str, args: Iterable[Code]) -> Code:
-    """A chain of one operator, without constants that it does not depend on: they can never decide."""
+    """Return a chain of one operator, without constants that are neutral in it: they can never decide."""
     neutral = constant(Bool(), op == "&&")
     parts = [part for arg in args for part in _joined(op, arg)]
     left = tuple(part for part in parts if part != neutral)
@@ -220,7 +220,7 @@ def _chain(op: str, args: Iterable[Code]) -> Code:
 
 
 def _plain(code: Code) -> bool:
-    """Whether it may be cast as it stands: a variable, or a constant that is one token."""
+    """Return whether the code may be cast as it stands: a variable, or a constant that is one token."""
     match code:
         case Constant(value=value, type=kind):
             return kind not in FLOATS or value >= 0
@@ -233,7 +233,7 @@ def _plain(code: Code) -> bool:
 
 
 def _narrower(source: str, target: str) -> bool:
-    """Whether the result of an operation may be cast to `target`, which is no wider (MISRA C 10.8).
+    """Return whether the result of an operation may be cast to `target`, which is no wider (MISRA C 10.8).
 
     It is an integer type of the same sign, or a single for a double.
     """
@@ -245,18 +245,18 @@ def _narrower(source: str, target: str) -> bool:
 
 
 def _ends(number: Expr) -> Ends:
-    """The bounds of a number by its type."""
+    """Return the bounds of a number by its type."""
     assert isinstance(number.type, Int | Real)
     return number.type.low, number.type.high
 
 
 def _may_be_zero(ranges: Ranges, number: Expr) -> bool:
-    """Whether ranges alone leave it open that a number is 0."""
+    """Return whether ranges alone leave it open that a number is 0."""
     return all(low <= 0 <= high for low, high in (_ends(number), ranges.of(number)))
 
 
 def _within(ends: Ends, held: str) -> bool:
-    """Whether all between these ends are numbers of a type."""
+    """Return whether all numbers between these ends fit the type."""
     if held in FLOATS:
         return all(map(math.isfinite, ends))
     low, high = type_bounds(held)
@@ -264,25 +264,25 @@ def _within(ends: Ends, held: str) -> bool:
 
 
 def _whole_ends(kind: Scalar, target: str) -> Ends:
-    """The least and the greatest number of a kind that is no integer of which the whole part is of an integer type."""
+    """Return the least and the greatest real of a kind whose whole part fits an integer type."""
     low, high = type_bounds(target)
     greatest = float(high)
     return float(low), greatest if greatest <= high else next_value(kind, greatest, -1)
 
 
 def _unsigned(word: Expr) -> str:
-    """The type without a sign in which bits of a word are computed."""
+    """Return the unsigned type in which bits of a word are computed."""
     return "uint32_t" if bits_of(word) <= 32 else "uint64_t"
 
 
 def _pattern(bits: int, word: Expr) -> Name:
-    """Bits as a constant, in the type in which those of the word are computed."""
+    """Spell bits as a constant of the type in which the word's bits are computed."""
     return Name(f"{bits:#x}u" if _unsigned(word) == "uint32_t" else f"UINT64_C({bits:#x})", _unsigned(word))
 
 
 @dataclass
 class CText(Text):
-    """C99.
+    """Makes the code of one program in C99.
 
     Attributes:
         failing: Procedures after which a fault may stand.
@@ -295,30 +295,30 @@ class CText(Text):
 
     @property
     def faultless(self) -> Code:
-        """That no fault stands."""
+        """The condition that no fault stands."""
         return infix("==", FAULT, Name(self.names.faults[0]))
 
     @property
     def faulted(self) -> Code:
-        """That a fault stands."""
+        """The condition that a fault stands."""
         return infix("!=", FAULT, Name(self.names.faults[0]))
 
     def place(self, leaf: str) -> Place:
-        """A leaf."""
+        """Return the place of a leaf in the state."""
         return Place(self.names.paths[leaf])
 
     def function(self, procedure: str) -> str:
-        """The function of a procedure."""
+        """Return the name of a procedure's function."""
         return f"{self.names.program}_do_{self.names.procedures[procedure]}"
 
     def constant(self, kind: Scalar, value: Value, held: str = "") -> Code:
-        """A constant: the enumerator of a member; a number as one of type `held`, else of the kind's own."""
+        """Return a constant: the enumerator of a member; a number as one of type `held`, else of the kind's own type."""
         if isinstance(kind, Enum):
             return Name(self.names.constants[kind.name][int(value)], c_type(kind))
         return Constant(value, held or c_type(kind))
 
     def expr(self, expr: Expr) -> Code:
-        """An expression, in its type `carried`."""
+        """Return the code of an expression, in its type `carried`."""
         match expr:
             case model.Literal(value=value, type=kind):
                 return self.constant(kind, value, carried(expr))
@@ -340,7 +340,7 @@ class CText(Text):
                 assert_never(expr)
 
     def _bits(self, expr: model.Apply) -> Code | None:
-        """A mask as one comparison, a field as a shift and a mask; None where the expression is neither."""
+        """Return a mask as one comparison, or a field as a shift and a mask; None where the expression is neither."""
         mask, part = mask_of(expr), field_of(expr)
         if mask is not None:
             care, value = (_pattern(bits, mask.word) for bits in (mask.care, mask.value))
@@ -355,27 +355,27 @@ class CText(Text):
         return self.converted(number, _unsigned(part.word), carried(expr))
 
     def _word(self, word: Expr) -> Code:
-        """A word in a type without a sign."""
+        """Return a word in an unsigned type."""
         if isinstance(word, LEAVES) and carried(word).startswith("u"):
             return self.expr(word)
         return self.in_type(word, _unsigned(word))
 
     def whole(self, expr: Expr) -> Code:
-        """An expression in a type that is signed only where its values can be negative."""
+        """Return an expression in a type that is signed only where its values can be negative."""
         kind, held = expr.type, carried(expr)
         if isinstance(kind, Int) and kind.low >= 0 and not held.startswith("u"):
             return self.in_type(expr, local_type(kind))
         return self.expr(expr)
 
     def in_type(self, expr: Expr, target: str, ends: Ends | None = None) -> Code:
-        """The value of an expression as one of C type `target`, in which it was proved to fit.
+        """Return the value of an expression in C type `target`, in which it was proved to fit.
 
-        What is computed on the way is computed there, too, where all of it fits: nothing is cast twice.
+        Its parts are computed in that type, too, where all of them fit: nothing is cast twice.
 
         Args:
             expr: The expression.
             target: An integer type.
-            ends: Between which it was proved to lie; those of the type, where none are given.
+            ends: Bounds between which it was proved to lie; by default those of the type.
         """
         if self._unseen(expr, ends or type_bounds(target)) is not None:
             held = word_type(*_bounds((expr,)))
@@ -396,9 +396,9 @@ class CText(Text):
         return self.converted(self.expr(expr), carried(expr), target)
 
     def _unseen(self, expr: Expr, ends: Ends) -> Ends | None:
-        """The ends that ranges alone show of a number, where they do not show it to lie between others.
+        """Return a number's ends by ranges alone, where these do not show it to lie between the given ends; else None.
 
-        None also for one of which they show that it is never there: it is never computed.
+        Return None also where the ranges leave no value: the number is never computed.
         """
         kind, (low, high) = expr.type, ends
         if not isinstance(kind, Int | Real) or (low <= kind.low and kind.high <= high):
@@ -410,7 +410,7 @@ class CText(Text):
         return None if (low <= least and most <= high) or most < low or high < least else (least, most)
 
     def _held(self, expr: Expr, held: str, ends: Ends) -> Code:
-        """A number in type `held`, kept between the ends by a call that changes nothing that was proved to lie there."""
+        """Return a number in type `held`, kept between the ends by a call that changes nothing, as it was proved to lie there."""
         code, unseen = self._given(expr, held), self._unseen(expr, ends)
         if unseen is None:
             return code
@@ -420,7 +420,7 @@ class CText(Text):
         return self._helper(f"{name}_{CALLED[held]}", (code, *inside), held)
 
     def _computed(self, expr: model.Apply, held: str) -> Code:
-        """An operation on numbers, in type `held`; a divisor is none that can be 0."""
+        """Return an operation on numbers, in type `held`; a divisor that can be 0 is excluded."""
         op, args = expr.op, self._arguments(expr, held)
         assert is_arithmetic(op)
         if op in DIVIDED and isinstance(expr.type, Int):
@@ -430,9 +430,9 @@ class CText(Text):
         return self._operation(op, args, held)
 
     def _arguments(self, expr: model.Apply, held: str) -> tuple[Code, ...]:
-        """The operands of an operation on numbers.
+        """Return the operands of an operation on numbers.
 
-        What the lines state of them is said where without it the result could be no number of the type, or the divisor 0.
+        Ranges that the lines state are enforced where, without them, the result might not fit the type, or the divisor be 0.
         """
         ends: list[Ends | None] = [None for _ in expr.args]
         proved, within = self._proved, partial(_within, held=held)
@@ -455,11 +455,11 @@ class CText(Text):
 
     @property
     def _proved(self) -> Ranges:
-        """The ranges here, with what the lines state of what nothing has written since."""
+        """The ranges here, met with those that the lines state of variables not written since."""
         return self._ranges.met(self._stated)
 
     def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
-        """An array element by a computed index, which is left out where it can only be 0."""
+        """Return an array element by a computed index, which is left out where it can only be 0."""
         steps: tuple[str | Code, ...] = self.names.paths[leaves[0]]
         if index is not None and len(leaves) > 1:
             pairs = zip(steps, self.names.paths[leaves[1]], strict=True)
@@ -468,19 +468,19 @@ class CText(Text):
         return Place(steps, c_type(kind))
 
     def _index(self, index: Expr, length: int) -> Code:
-        """An index of an array of this length."""
+        """Return an index of an array of this length."""
         ends = 0, length - 1
         if self._unseen(index, ends) is None:
             return self.expr(index)
         return self._held(index, word_type(*_bounds((index,))), ends)
 
     def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
-        """Whether it is one of the values."""
+        """Return the condition that the subject is one of the values."""
         equal = tuple(infix("==", subject, self.constant(kind, value)) for value in values)
         return infix("||", *equal) if equal else constant(Bool(), value=False)
 
     def _applied(self, op: Operator, args: tuple[Expr, ...], expr: model.Apply) -> Code:
-        """An operation, in the type that the prover shows operands and result to fit in."""
+        """Return an operation, in the type that the prover shows operands and result to fit in."""
         if op is Op.XOR:  # of truth values; it is no comparison where the operands are known to be equal
             op = Op.NE
         if is_comparison(op):
@@ -502,7 +502,7 @@ class CText(Text):
         return self._operation(op, operands, "")
 
     def _in_turn(self, expr: model.Apply) -> tuple[Code, ...]:
-        """The operands of a truth function, of which the second is looked at where the first does not decide."""
+        """Return the operands of a truth function; the second one's ranges are those where the first does not decide."""
         (first, second), before = expr.args, self._ranges
         given = self.expr(first)
         self._ranges = before.where(first, holds=expr.op is not Op.OR)
@@ -511,7 +511,7 @@ class CText(Text):
         return codes
 
     def _operands(self, args: tuple[Expr, ...]) -> tuple[Code, ...]:
-        """The two sides of a comparison: each as it is where C compares them by their values."""
+        """Return the two sides of a comparison, unchanged where C compares them by their values."""
         if not isinstance(args[0].type, Int):
             return tuple(map(self.expr, args))
         shared = _compared_in(args)
@@ -555,7 +555,7 @@ class CText(Text):
         return Invoke(f"{self.names.program}_{name}", bare, kind, helper=name)
 
     def converted(self, code: Code, source: str, target: str) -> Code:
-        """A value of C type `source` as one of `target`; it was proved to fit.
+        """Convert a value of C type `source` to `target`; it was proved to fit.
 
         The result of an operation is cast only to a type of its sign that is no wider; else a function of its own converts it
         (MISRA C 10.8).
@@ -569,7 +569,7 @@ class CText(Text):
         return self._helper(f"{CALLED[target]}_of_{CALLED[source]}", (code,), target)
 
     def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
-        """A value for a leaf, or for a local, in the type that it is kept in."""
+        """Return a value for a leaf, or for a local, in the type that it is kept in."""
         if isinstance(kind, Real):
             return infix("+", self._held(value, carried(value), (kind.low, kind.high)), constant(kind, 0))
         target, source = c_type(kind) if leaf else local_type(kind), carried(value)
@@ -582,11 +582,11 @@ class CText(Text):
     # --- statements ---
 
     def body(self, body: Sequence[model.Statement], stated: Ranges) -> Body:
-        """The statements of a procedure or a line.
+        """Return the statements of a procedure or a line.
 
         Args:
             body: The statements.
-            stated: What lines state before it.
+            stated: The ranges that lines state before it.
         """
         self._ranges, self._stated = Ranges(), stated
         done = self.block(body)
@@ -594,7 +594,7 @@ class CText(Text):
         return done
 
     def block(self, body: Sequence[model.Statement]) -> Body:
-        """Statements; after a call that may fail the rest is guarded."""
+        """Return statements; after a call that may fail the rest is guarded."""
         done: list[Stmt] = []
         for at, statement in enumerate(body, 1):
             done += self.statement(statement)
@@ -611,16 +611,16 @@ class CText(Text):
         return any(call.procedure in self.failing for call in calls)
 
     def guard(self, loop: model.For) -> tuple[Code, ...]:
-        """What must hold in a loop that it goes on."""
+        """Return the conditions under which a loop goes on."""
         return (self.faultless,) if self._may_fail(loop) else ()
 
     def beginning(self, kind: Scalar) -> Code:
-        """What a local begins with, which nothing reads: zero, or the number of its type that is nearest to it."""
+        """Return the first value of a local, which nothing reads: zero, or the number of its type that is nearest to it."""
         nearest = min(max(0, kind.low), kind.high) if isinstance(kind, Int | Real) else 0
         return self.constant(kind, nearest, local_type(kind))
 
     def statement(self, statement: model.Statement) -> Iterator[Stmt]:
-        """A statement; a whole number of a local is one of at least 32 bits."""
+        """Yield the code of a statement; a local whole number has at least 32 bits."""
         match statement:
             case model.Local(name=name, type=kind, value=None):
                 yield Set(local(name), self.beginning(kind))
@@ -643,14 +643,14 @@ class CText(Text):
                 self._ranges = self._ranges.after(statement)
 
     def _inside(self, body: Sequence[model.Statement], ranges: Ranges) -> tuple[Body, Ranges]:
-        """Statements before which these ranges are known, and the ranges after them."""
+        """Return the code of statements before which these ranges are known, and the ranges after them."""
         self._ranges, stated = ranges, self._stated
         done = self.block(body)
         self._stated = stated
         return done, self._ranges
 
     def assigned(self, place: model.Place, value: Expr) -> Stmt:
-        """An assignment."""
+        """Return the code of an assignment."""
         given = self.stored(place.type, value, leaf=not isinstance(place, model.ToLocal))
         target: Code
         match place:
@@ -664,7 +664,7 @@ class CText(Text):
         return Set(target, given) if given != target else Line("/* keeps its value */")
 
     def case(self, statement: model.Case) -> Body:
-        """A block with the value in it, and a chain of `if`."""
+        """Return a block with the value in it, and a chain of `if`."""
         self._nested += 1
         kind, given = statement.subject.type, self.whole(statement.subject)
         held = c_type(kind) if isinstance(given, Place) else local_type(kind)
@@ -682,7 +682,7 @@ class CText(Text):
 
 
 def locals_of(procedure: model.Procedure) -> Iterator[tuple[str, Scalar]]:
-    """Locals, declared at the top of the function; a loop declares its variable itself."""
+    """Yield the locals, declared at the top of the function; a loop declares its variable itself."""
     for statement in everything(procedure.body):
         if isinstance(statement, model.Local):
             yield statement.name, statement.type

@@ -51,7 +51,7 @@ MOST_TOLD = 1024
 
 
 def settle_function(c: CProgram) -> Function:
-    """Give the function that moves deferred values in."""
+    """Return the function that moves deferred values in."""
     deferred = [(v, v.deferred_until) for v in c.program.variables if v.deferred_until is not None]
     ready = [Name(f"ready{at}") for at, _ in enumerate(deferred)]
     pairs = list(zip(ready, deferred, strict=True))
@@ -64,7 +64,7 @@ def settle_function(c: CProgram) -> Function:
 
 
 def safe_functions(c: CProgram) -> Iterator[Function]:
-    """Give the function that shows safe outputs, where any is declared."""
+    """Yield the function that shows safe outputs, where any is declared."""
     shown = [
         assigned(c, variable, variable.safe) for variable in c.program.variables if variable.safe is not None
     ]
@@ -73,7 +73,7 @@ def safe_functions(c: CProgram) -> Iterator[Function]:
 
 
 def action_functions(c: CProgram) -> Iterator[Function]:
-    """One function a table: a match that runs the line's actions."""
+    """Yield one function a table: it matches and runs the line's actions."""
     for table in c.plan.tables:
         name = c.names.tables[table.table.name]
         told = [stmt for place in table.monitored for stmt in _told(c, place, table.stops)]
@@ -85,7 +85,7 @@ def action_functions(c: CProgram) -> Iterator[Function]:
 
 
 def assumption_functions(c: CProgram) -> Iterator[Function]:
-    """One function for each assumption that is checked."""
+    """Yield one function for each assumption that is checked."""
     told = {place for table in c.plan.tables for place in table.monitored}
     for place in sorted(told):
         name, assumption = c.names.holding[place], c.program.assumptions[c.plan.monitored[place]]
@@ -98,7 +98,7 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
 
 
 def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
-    """Marks an assumption that fails; the first that stops and fails ends the cycle."""
+    """Return code that marks an assumption that fails; the first that stops and fails ends the cycle."""
     word, bit = divmod(place, FAILED_BITS)
     failed = Place((c.names.failed[word],))
     shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
@@ -113,7 +113,7 @@ def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
 
 
 def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
-    """Finds the line and runs its actions."""
+    """Return code that finds the line and runs its actions."""
     cases: list[Stmt] = []
     named = zip(c.names.lines[table.table.name], table.lines, table.table.every_line, strict=True)
     for number, (line_name, line, row) in enumerate(named, 1):
@@ -136,7 +136,7 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
 
 
 def _kept(c: CProgram, table: PlanTable, line: int) -> Body:
-    """Keeps the line of a table that others follow in a cycle."""
+    """Return code that keeps the line of a table that others follow in a cycle."""
     leaf = c.program.line_leaves.get(table.table.name)
     return () if leaf is None else (assigned(c, c.program.variable(leaf), line),)
 
@@ -146,7 +146,7 @@ def _begin(c: CProgram) -> Do:
 
 
 def _cycle(c: CProgram, doc: str, name: str, *body: Stmt) -> Function:
-    """The frame of every cycle, and of a step where outputs have safe values."""
+    """Return the frame of every cycle, and of a step where outputs have safe values."""
     safe = (when(c.text.faulted, run_on_state(c, "safe")),) if _shows_safe(c) else ()
     run = when(c.text.faultless, *body)
     return on_state(c, doc, name, _begin(c), run, *safe, Leave(FAULT), gives="int32_t")
@@ -157,7 +157,7 @@ def _shows_safe(c: CProgram) -> bool:
 
 
 def step_functions(c: CProgram) -> Iterator[Function]:
-    """Give the step of each table."""
+    """Yield the step of each table."""
     for table in c.plan.tables:
         name = c.names.tables[table.table.name]
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
@@ -169,7 +169,7 @@ def step_functions(c: CProgram) -> Iterator[Function]:
 
 
 def cycle_function(c: CProgram, level: model.Level) -> Function:
-    """Give the cycle of a level."""
+    """Return the cycle of a level."""
     before = (_called(c, name) for name in level.preprocess)
     stages = (
         (True, tuple(_chosen(c, stage, partial(_stage, c), f"chosen_{at}")))
@@ -188,7 +188,7 @@ def _called(c: CProgram, procedure: str) -> tuple[bool, Body]:
 
 
 def _while_faultless(c: CProgram, parts: Sequence[tuple[bool, Body]]) -> Iterator[Stmt]:
-    """Statements in order; after each that may end in a fault it is asked whether one stands."""
+    """Yield statements in order; after each that may fail the rest runs only if no fault stands."""
     together: list[Stmt] = []
     asked = False
     for number, (fails, body) in enumerate(parts, 1):
@@ -199,7 +199,7 @@ def _while_faultless(c: CProgram, parts: Sequence[tuple[bool, Body]]) -> Iterato
 
 
 def _order(c: CProgram, level: model.Level) -> str:
-    """The order of several tables, and how a fault tells one before the last."""
+    """Describe the order of several tables, and how a fault tells one before the last."""
     if not level.stages:
         return ""
     places = (f"{name} ({c.names.places[name]})" for name in level.staged)
@@ -216,7 +216,7 @@ def _table_run(c: CProgram, table: str) -> Do:
 
 
 def _stage(c: CProgram, table: str) -> Body:
-    """Runs a table that others follow: the trace's line is the last one's, a fault for want of a line names the table."""
+    """Return code for a table that others follow: the trace's line is the last table's; a fault for want of a line names this one."""
     unmatched = Infix(
         "||",
         tuple(infix("==", FAULT, fault_name(c, end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
@@ -226,7 +226,7 @@ def _stage(c: CProgram, table: str) -> Body:
 
 
 def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body], name: str) -> Iterator[Stmt]:
-    """Runs the table of a choice, whose value is kept by that name."""
+    """Yield code that runs the table of a choice and keeps the choice's value in a variable of that name."""
     if isinstance(choice, model.OneTable):
         yield from run(choice.table)
         return
@@ -241,7 +241,7 @@ def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body], 
 
 
 def init_function(c: CProgram) -> Function:
-    """Give the function that makes the initial state."""
+    """Return the function that makes the initial state."""
     values = (assigned(c, variable, variable.initial) for variable in c.program.variables)
     digest = Set(Place((DIGEST,)), Name(c.names.digest))
     return on_state(

@@ -28,7 +28,7 @@ FAULT_DOCS = (
 
 
 def type_headers(c: CProgram) -> dict[str, str]:
-    """A header for each file that declares types: all programs that use it share them."""
+    """Return a header for each file that declares types: all programs that use the file share it."""
     headers = {}
     for unit in dict.fromkeys(c.names.units.values()):
         files = [file for file, word in c.names.units.items() if word == unit]
@@ -48,13 +48,13 @@ def type_headers(c: CProgram) -> dict[str, str]:
 
 
 def _source(c: CProgram, file: str) -> str:
-    """A file that declares types, as the first line of its header names it."""
+    """Return the name of a file that declares types, as the first line of its header shows it."""
     own = file in {"", c.program.file}
     return c.plan.source if own else f"{c.plan.places.get(file, file)}.rcs"
 
 
 def shared(c: CProgram) -> dict[str, list[str]]:
-    """Names that the header of each unit declares."""
+    """Return the names that the header of each unit declares."""
     names = {unit: [types_header(unit), types_guard(unit)] for unit in c.names.units.values()}
     for kind in c.program.types:
         names[c.names.units[kind.file]].append(c.names.types[kind.name])
@@ -64,7 +64,7 @@ def shared(c: CProgram) -> dict[str, list[str]]:
 
 
 def _parts(record: model.Record) -> Iterator[Enum | model.Record]:
-    """The declared types of a record's own fields."""
+    """Yield the declared types of a record's own fields."""
     for part in record.fields:
         kind = part.type
         while isinstance(kind, model.Array):
@@ -83,7 +83,7 @@ def _enum(c: CProgram, enum: Enum) -> tuple[str, str, str, Fields]:
 
 
 def _numbered(names: Iterable[str], docs: Iterable[str]) -> Fields:
-    """Constants from 0 on."""
+    """Return constants numbered from 0."""
     pairs = zip(names, docs, strict=True)
     return tuple((f"{name} = {at}", comment(doc)) for at, (name, doc) in enumerate(pairs))
 
@@ -104,7 +104,7 @@ def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
 
 
 def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
-    """Constants for what the trace tells by its position, each kind with what is said of it."""
+    """Yield the constants for positions in the trace, each kind with a comment."""
     for table in c.plan.tables:
         names = c.names.lines[table.table.name]
         docs = (  # where the constant does not say it
@@ -136,7 +136,7 @@ def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
 
 
 def fields(c: CProgram) -> Iterator[tuple[str, str]]:
-    """Give the members of the state: the declaration of each, and its doc."""
+    """Yield the members of the state: the declaration of each, and its doc."""
     variables = {v.name: v for v in c.program.variables}
     position = {v.name: at for at, v in enumerate(c.program.variables)}
     for variable in c.program.declared:
@@ -165,7 +165,7 @@ def fields(c: CProgram) -> Iterator[tuple[str, str]]:
 
 
 def size_text(c: CProgram) -> str:
-    """The bytes of the state, on each kind of target."""
+    """Spell the size of the state in bytes, on each kind of target."""
     most, *others = dict.fromkeys(sizes(c.program, c.names))
     return f"{most} bytes" + (
         f", or {', '.join(map(str, others))} where members are aligned to less than their size"
@@ -175,14 +175,14 @@ def size_text(c: CProgram) -> str:
 
 
 def layout_condition(c: CProgram) -> str:
-    """A C condition that the state has one of the sizes that are expected."""
+    """Spell the C condition that the state has one of the expected sizes."""
     held = dict.fromkeys(sizes(c.program, c.names))
     tests = [f"(sizeof({c.p}_t) == {size}u)" for size in held]
     return " || ".join(tests)
 
 
 def user_functions(c: CProgram) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Each user function, and the types of its parameters; a pointer's ends in a star."""
+    """Yield each user function with the types of its parameters; a pointer's ends in a star."""
     for procedure in c.program.procedures:
         if procedure.extern is not None:
             yield (
@@ -202,7 +202,7 @@ def externs(c: CProgram) -> Iterator[str]:
 
 
 def _parameters(c: CProgram, extern: Procedure) -> Iterator[tuple[str, str]]:
-    """Types, up to the name, and names."""
+    """Yield the parameters of a prototype: each type, up to the name, and the name."""
     kinds = {v.name: v.type for v in c.program.variables}
     word = c_scope().fresh
     yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
@@ -211,7 +211,7 @@ def _parameters(c: CProgram, extern: Procedure) -> Iterator[tuple[str, str]]:
 
 
 def range_text(kind: model.Type) -> str:
-    """The range of a number, with its unit; empty for what has none."""
+    """Spell the range of a number, with its unit; "" for a type without one."""
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
             units = unit_text(unit)

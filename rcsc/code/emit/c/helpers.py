@@ -29,7 +29,7 @@ HELD: Mapping[str, str] = {
 
 
 def _held(program: str, op: str, short: str) -> Function:
-    """The function that keeps a number where it was proved to lie; the last outcome would change it, and is never taken."""
+    """Return the function that keeps a number where it was proved to lie; the outcome that would change it is never taken."""
     kind = SHORT[short]
     a, b, least, most = map(Name, ("a", "b", "least", "most"))
     positive, negative = (infix(sign, b, Constant(0, kind)) for sign in (">", "<"))
@@ -48,7 +48,7 @@ def _held(program: str, op: str, short: str) -> Function:
 
 
 def helper(program: str, name: str) -> Function:
-    """A function of one operator or conversion, by its name in `Invoke.helper`; what it means is `interpret.OPERATORS`'s."""
+    """Return the function of one operator or conversion, by its name in `Invoke.helper`; `interpret.OPERATORS` defines its meaning."""
     a, b = Name("a"), Name("b")
     if "_of_" in name:
         target, source = (SHORT[short] for short in name.split("_of_"))

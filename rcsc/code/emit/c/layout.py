@@ -26,10 +26,10 @@ CAPS = (8, 4, 2, 1)
 
 @dataclass(frozen=True, slots=True)
 class Digest:
-    """What tells a state from those of other tables.
+    """The digest that tells a program's states from those of other tables.
 
     Attributes:
-        meaning: 16 hexadecimal digits of what the tables mean (`Digests.whole`).
+        meaning: 16 hexadecimal digits of the tables' meaning (`Digests.whole`).
         layout: 16 of the members of the state, by name and C type.
     """
 
@@ -38,7 +38,7 @@ class Digest:
 
     @property
     def state(self) -> int:
-        """Both as one number of 32 bits: what a state bears."""
+        """Both as one number of 32 bits, which each state bears."""
         return int(hashlib.sha256(f"{self.meaning} {self.layout}".encode()).hexdigest()[:8], 16)
 
 
@@ -50,17 +50,17 @@ def digest(program: Program, names: Names) -> Digest:
 
 
 def sizes(program: Program, names: Names) -> tuple[int, ...]:
-    """The bytes of the state under each alignment in `CAPS`."""
+    """Return the size of the state in bytes, under each alignment in `CAPS`."""
     return tuple(_end([_shape(kind, cap) for _, kind in members(program, names)], cap)[0] for cap in CAPS)
 
 
 def record_size(record: Record) -> int:
-    """The bytes of a record where every scalar is aligned to its size."""
+    """Return the size of a record in bytes, where every scalar is aligned to its size."""
     return _shape(record, CAPS[0])[0]
 
 
 def members(program: Program, names: Names) -> Iterator[tuple[str, Type | str]]:
-    """Give the members of the state in order: each name, and its type, or the C type of what no table declares."""
+    """Yield the members of the state in order: each name with its type, or its C type where no table declares it."""
     variables = {v.name: v.type for v in program.variables}
     yield DIGEST, "uint32_t"
     for variable in program.declared:
@@ -91,7 +91,7 @@ def _flat(names: Names, path: str, kind: Type | str) -> Iterator[tuple[str, str]
 
 
 def _shape(kind: Type | str, cap: int) -> tuple[int, int]:
-    """Size and alignment of a type, in bytes."""
+    """Return size and alignment of a type, in bytes."""
     match kind:
         case Record(fields=fields):
             return _end([_shape(part.type, cap) for part in fields], cap)
@@ -106,7 +106,7 @@ def _shape(kind: Type | str, cap: int) -> tuple[int, int]:
 
 
 def _end(shapes: list[tuple[int, int]], cap: int) -> tuple[int, int]:
-    """Size and alignment of a struct of members of these shapes."""
+    """Return size and alignment of a struct whose members have these shapes."""
     alignment = max((alignment for _, alignment in shapes), default=1)
     ends = accumulate(shapes, lambda at, shape: _aligned(at, shape[1]) + shape[0], initial=0)
     *_, end = ends
@@ -118,6 +118,6 @@ def _aligned(at: int, alignment: int) -> int:
 
 
 def scalar_size(name: str) -> int:
-    """The bytes of a scalar C type of ours."""
+    """Return the bytes of a scalar C type that rcsc emits."""
     width = re.search(r"\d+", name)
     return int(width[0]) // 8 if width else {"bool": 1, "float": 4, "double": 8}[name]

@@ -29,7 +29,7 @@ from rcsc.lang.model import Enum, Procedure, Program
 
 
 def procedure_function(c: CProgram, procedure: Procedure) -> Function:
-    """Give the function of a procedure."""
+    """Return the function of a procedure."""
     params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} {local_word(p.name)}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
     body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
@@ -51,7 +51,7 @@ def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
 
 
 def _held(c: CProgram, kind: model.Scalar) -> str:
-    """The type of a parameter or a local; that of an enumeration by its name."""
+    """Return the type of a parameter or a local; that of an enumeration by its name."""
     return c.names.types[kind.name] if isinstance(kind, Enum) else local_type(kind)
 
 
@@ -76,7 +76,7 @@ def _extern_body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
 
 
 def failing(program: Program) -> frozenset[str]:
-    """Procedures that call an extern procedure, directly or not."""
+    """Return the procedures that call an extern procedure, directly or not."""
     failing = {str(p.name) for p in program.procedures if p.extern is not None}
     while True:
         more = {str(p.name) for p in program.procedures if failing.intersection(_called(p.body))} - failing
@@ -86,7 +86,7 @@ def failing(program: Program) -> frozenset[str]:
 
 
 def callees_first(program: Program) -> list[Procedure]:
-    """The procedures that lines and levels run, each after those that it calls; in declared order where it is free."""
+    """Return the procedures that lines and levels run, each after those that it calls; in declared order where that is free."""
     by_name = {p.name: p for p in program.procedures}
     rows = [line.actions for table in program.tables for line in table.lines]
     rows += [table.default.actions for table in program.tables if table.default is not None]
@@ -112,5 +112,5 @@ def callees_first(program: Program) -> list[Procedure]:
 
 
 def _called(body: Iterable[model.Statement]) -> dict[model.ProcedureName, None]:
-    """The procedures that statements call, in order."""
+    """Return the procedures that statements call, in order."""
     return dict.fromkeys(call.procedure for call in everything(body) if isinstance(call, model.Call))

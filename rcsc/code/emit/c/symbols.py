@@ -34,7 +34,7 @@ from rcsc.lang.restart import Adopted, After, Fixed, SameAs, Stands
 
 
 def symbols(plan: Plan, names: Names, digest: Digest) -> str:
-    """The symbol file: every name, for tools."""
+    """Write the symbol file: every name, for tools."""
     p = names.program
     safe = {v.name for v in plan.program.variables if v.safe is not None}  # not what it was after a fault
     document = {
@@ -96,7 +96,7 @@ def symbols(plan: Plan, names: Names, digest: Digest) -> str:
 
 
 def _roles(roles: Roles) -> dict[str, object]:
-    """Whom the levels serve and command: the peer, the records of orders and reports, and what their members mean."""
+    """Return whom the levels serve and command: the peer, the records of orders and reports, and the meaning of their members."""
 
     def said(role: Role) -> dict[str, str | None]:
         words = {"rest": role.rest, "done": role.done, "failed": role.failed, "reason": role.reason}
@@ -107,7 +107,7 @@ def _roles(roles: Roles) -> dict[str, object]:
 
 
 def _adopted(restart: tuple[tuple[VariableName, Adopted], ...]) -> Iterator[dict[str, object]]:
-    """What each leaf adopts that starts other than initially."""
+    """Yield an entry for each leaf that a restart gives another value than the initial one."""
     for leaf, adopted in restart:
         match adopted:
             case Fixed(value):
@@ -125,12 +125,12 @@ MOST_DOC = 1000
 
 
 def shortened(text: str) -> str:
-    """A text as a symbol file has it."""
+    """Return a text as the symbol file has it, cut where it is long."""
     return text if len(text) <= MOST_DOC else f"{text[:MOST_DOC]}..."
 
 
 def _described(variable: Variable) -> dict[str, object]:
-    """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
+    """Describe a leaf for a log or a shell: its range, unit or members, initial value and doc."""
     kind = variable.type
     entry: dict[str, object] = {"initial": variable.initial, "doc": shortened(variable.doc)}
     if variable.safe is not None:
@@ -148,13 +148,13 @@ def _described(variable: Variable) -> dict[str, object]:
 
 
 def _stage(program: Program, stage: TableChoice) -> dict[str, object]:
-    """What runs before the last table, and the leaf that holds the line of each."""
+    """Return the tables that run before the last one, and the leaf that holds the line of each."""
     leaves = program.line_leaves
     return {**_dispatched(stage), "kept": {name: leaves[name] for name in stage.names}}
 
 
 def _dispatched(choice: TableChoice) -> dict[str, object]:
-    """Which table runs: one, or by the value of a leaf."""
+    """Return which table runs: one, or by the value of a leaf."""
     if isinstance(choice, OneTable):
         return {"table": choice.table}
     by = choice.selector.name if isinstance(choice.selector, Read) else ""
@@ -165,7 +165,7 @@ _Writers = tuple[tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]
 
 
 def _unset(program: Program) -> list[dict[str, object]]:
-    """Return the numbers that nobody has set when the program starts, those with the same writers together.
+    """Return the numbers that nobody has set when the program starts, grouped by their writers.
 
     They have no initial value of their own, but 0, which means nothing until a line, a procedure of the cycle
     or a buffer writes it. Members of enumerations and bools mean something from the start.
@@ -209,7 +209,7 @@ def _meant_by_nobody(variable: Variable) -> bool:
 
 
 def _by_line(program: Program) -> Mapping[str, Mapping[str, frozenset[VariableName]]]:
-    """What each line of each table may write."""
+    """Return the variables that each line of each table may write."""
     procedures = {str(procedure.name): procedure for procedure in program.procedures}
     return {
         table.name: {
@@ -225,7 +225,7 @@ def _lines(table: Table) -> tuple[Line | Default, ...]:
 
 
 def _by_level(program: Program) -> Mapping[str, frozenset[VariableName]]:
-    """What each level may write before its tables and after them."""
+    """Return the variables that each level may write before its tables and after them."""
     writes = {str(procedure.name): procedure.writes for procedure in program.procedures}
     return {
         level.name: frozenset(

@@ -11,7 +11,7 @@ from rcsc.lang.model import Int, Program, Real, Variable, spell
 
 
 def declared_badly(program: Program) -> Iterator[Diagnostic]:
-    """Yield the warnings."""
+    """Yield a warning for each declared variable of which nothing says with what it starts."""
     leaves = {variable.name: variable for variable in program.variables}
     for declared in program.declared:
         unsaid = next((leaf for name in declared.leaves if _starts_unsaid(leaf := leaves[name])), None)

@@ -15,7 +15,7 @@ from rcsc.proof.table.verdict import Overlap
 
 
 def grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """The overlaps; of those that come of the same cells, to one end, the first tells the others in a note."""
+    """Return the overlaps with related ones grouped: the first of each group names the others in a note."""
     groups: dict[object, list[int]] = {}
     for at, (overlap, diagnostic) in enumerate(zip(overlaps, shown, strict=False)):
         cells = _apart_in(table, overlap)
@@ -33,7 +33,7 @@ def grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnosti
 
 
 def _apart_in(table: Table, overlap: Overlap) -> frozenset[tuple[str, str]]:
-    """The cells of two lines in columns where just one of them says something: what brings them together."""
+    """Return the cells of two lines in columns that just one of them fills: the cells that let both match."""
     pair = table.lines[overlap.first], table.lines[overlap.second]
     cells = zip(table.columns, *(line.tests for line in pair), strict=True)
     return frozenset(
@@ -62,7 +62,7 @@ def _alike_as(table: Table, overlaps: Sequence[Overlap], first: Overlap) -> str:
 
 
 def _said_under(heading: str, text: str) -> str:
-    """A cell with its heading: `called = abort`, `now in cleared`."""
+    """Spell a cell with its heading: `called = abort`, `now in cleared`."""
     if heading == "when":
         return text
     plain = re.match(r"[\w.]+$|-\d", text) is not None
@@ -70,5 +70,5 @@ def _said_under(heading: str, text: str) -> str:
 
 
 def names_of(names: Iterable[str]) -> str:
-    """Names for a message: `a`, `b`."""
+    """Spell names for a message: `a`, `b`."""
     return ", ".join(f"`{name}`" for name in names)

@@ -22,9 +22,9 @@ MOST_LOOKED_AT = 20
 def likely(
     program: Program, table: Table, findings: Iterable[TableFinding], options: Options
 ) -> Iterator[TableFinding]:
-    """The findings, with witnesses that all declared facts allow where there are such, those that the table does not assume too.
+    """Yield the findings, with witnesses that all declared facts allow where such exist.
 
-    A fact about two cycles allows what may follow some cycle.
+    These include the facts that the table does not assume. A fact about two cycles allows what may follow some cycle.
     """
     if all(assumption.name in table.assumptions for assumption in program.assumptions):
         yield from findings
@@ -58,7 +58,7 @@ def _likely_overlap(
 
 
 def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr], options: Options) -> Gap:
-    """The gap, with the region first that such an input lies in."""
+    """Return the gap with an input that the facts allow, and the region of that input first."""
     here = [
         negation(conjunction(test.condition for test in line.tests if test is not None))
         for line in table.lines
@@ -77,7 +77,7 @@ def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr],
 
 
 def _inside(program: Program, region: Region | None, witness: Witness) -> bool:
-    """Whether a witness lies in a region of variables; not where it is one of bits."""
+    """Return whether a witness lies in a region of variables; false for a region of bits."""
     kinds = {str(v.name): v.type for v in program.variables}
     return region is not None and all(
         name in witness and holds(box, key_of(kinds[name], witness[name])) for name, box in region.items()

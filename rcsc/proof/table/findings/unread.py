@@ -25,7 +25,7 @@ TOLD = frozenset({Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER})
 
 
 def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnostic]:
-    """Yield the warnings; none of a file that only declares words.
+    """Yield a warning for each name that nothing uses; none for a file that only declares words.
 
     Args:
         program: It may have findings of its own.
@@ -74,7 +74,7 @@ def _unread(declared: Declared, *, to_itself: bool) -> Diagnostic:
 
 
 def _read(program: Program) -> Iterator[str]:
-    """Leaves that something reads, but for the values of assignments."""
+    """Yield the leaves that something reads, but for the values of assignments."""
     for condition in _conditions(program):
         yield from (leaf.removeprefix(BEFORE) for leaf in read_by(condition))
     for procedure in program.procedures:
@@ -103,7 +103,7 @@ def _conditions(program: Program) -> Iterator[Expr]:
 
 
 def _assigned(program: Program) -> Iterator[tuple[str, str]]:
-    """Each variable that an assignment reads, and the one that it is assigned to."""
+    """Yield each variable that an assignment reads, with the variable assigned to."""
     for statement in every_statement(program):
         for place in written_by(statement)[:1]:
             for expr in expressions(statement):
@@ -121,7 +121,7 @@ class _Mentioned:
         self.seen: set[int] = set()
 
     def add(self, nodes: Iterable[object]) -> None:
-        """Add what these nodes mention, and all in them; lines share their cells."""
+        """Add all names mentioned in these nodes; lines share their cells, so that each node is entered once."""
         waiting = list(nodes)
         while waiting:
             node = waiting.pop()
@@ -139,14 +139,14 @@ _ASIDE = frozenset(("span", "cell", "cells", "places", "above", "same", "require
 
 
 def _says(node: object, part: str) -> bool:
-    """Whether names in this part of a node are mentioned, not declared."""
+    """Return whether names in this part of a node are mentioned, not declared."""
     if part in _ASIDE or (part == "name" and isinstance(node, _DECLARES)):
         return False
     return not (part == "members" and isinstance(node, tree.EnumDecl))
 
 
 def _members(enum: tree.EnumDecl, mentioned: _Mentioned) -> Iterator[Diagnostic]:
-    """What is wrong with one enumeration; its variables start with the first member."""
+    """Yield a warning for each unused member of an enumeration. The first is exempt: its variables start with it."""
     for member in enum.members[1:]:
         if member.text not in mentioned.names:
             message = f"nothing gives or asks for member `{member.text}` of `{enum.name.text}`"
@@ -154,7 +154,7 @@ def _members(enum: tree.EnumDecl, mentioned: _Mentioned) -> Iterator[Diagnostic]
 
 
 def _from_outside(program: Program) -> set[str]:
-    """Enumerations of inputs and outputs, of what extern procedures give, and of what is adopted at a restart."""
+    """Return the enumerations whose members may come from outside: of inputs and outputs, extern results, and adopted values."""
     outside = [d.type for d in program.declared if d.kind is not Kind.STATE]
     given = {str(leaf) for each in program.procedures if each.extern is not None for leaf in each.writes}
     given |= program.adopted.keys()
@@ -176,7 +176,7 @@ def _enums(kind: Type) -> Iterator[str]:
 
 
 def _linked(written: Iterable[tree.Declaration]) -> set[str]:
-    """Names of types in links, and of those that these are made of."""
+    """Return the names of types in links, and of those that these are made of."""
     links, types = _Mentioned(), list[tree.TypeDecl | tree.RecordDecl]()
     for each in written:
         if isinstance(each, tree.LinkDecl):

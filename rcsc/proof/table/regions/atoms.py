@@ -74,7 +74,7 @@ TRUE, FALSE = Every(()), Some(())
 
 @dataclass(frozen=True, slots=True)
 class FormColumn:
-    """What a form is made of: the term, its name in certificates, the bounds of its key."""
+    """A column that forms are sums of: its term, its name in certificates, the bounds of its key."""
 
     name: str
     term: Expr
@@ -83,13 +83,13 @@ class FormColumn:
 
     @property
     def opaque(self) -> bool:
-        """Whether more is known of it than its bounds: it depends on other columns."""
+        """Whether the term is not a leaf: it depends on other columns, so that more than its bounds is known."""
         return not isinstance(self.term, Read)
 
 
 @dataclass(frozen=True, slots=True)
 class Clauses:
-    """A line or an assumption as a conjunction: one box a form, and what is not an atom."""
+    """A line or an assumption as a conjunction: one box a form, and the parts that are not atoms."""
 
     boxes: tuple[tuple[int, Box], ...]
     rest: tuple[Formula, ...]
@@ -102,7 +102,7 @@ class Universe:
     Every column is also a form: `single[column]`.
 
     Attributes:
-        low, high: What each form can be at all.
+        low, high: The least and the greatest value of each form.
         norms: Of each form half the sum of its coefficients, by which rounding may change it, and the sum of their squares.
         opaque: Columns that are not leaves.
     """
@@ -120,7 +120,7 @@ class Universe:
         self._known: dict[tuple[int, bool], tuple[Expr, Formula]] = {}
 
     def column(self, term: Expr) -> int:
-        """The number of `term`, entered when new."""
+        """Return the number of `term`; a new term is entered."""
         name = term.name if isinstance(term, Read) else spelled(term)
         known = self._column.get(name)
         if known is None:
@@ -133,7 +133,7 @@ class Universe:
         return known
 
     def form(self, form: Form) -> int:
-        """The number of `form`, entered when new."""
+        """Return the number of `form`; a new form is entered."""
         known = self._form.get(form)
         if known is None:
             known = self._form[form] = len(self.forms)
@@ -150,7 +150,7 @@ class Universe:
         return known
 
     def atom(self, form: int, box: Iterable[tuple[int, int]]) -> Formula:
-        """`form in box`, clipped to the form's range; a constant where that decides it."""
+        """Return the formula `form in box`, clipped to the form's range; a constant where the range decides it."""
         low, high = self.low[form], self.high[form]
         clipped = tuple((max(a, low), min(b, high)) for a, b in box if a <= high and b >= low and a <= b)
         if not clipped:
@@ -158,11 +158,11 @@ class Universe:
         return TRUE if clipped == ((low, high),) else Atom(form, clipped)
 
     def of_test(self, test: Test) -> Formula:
-        """A cell's condition; where `resolve` found it to be a box, that box."""
+        """Return a cell's condition as a formula; where `resolve` found it to be a box, that box."""
         return every(self.parts_of_test(test))
 
     def parts_of_test(self, test: Test) -> Iterator[Formula]:
-        """Formulas whose conjunction is a cell's condition."""
+        """Yield formulas whose conjunction is a cell's condition."""
         if test.box is None:
             atoms = self._known
             for part in conjuncts(test.condition):
@@ -173,7 +173,7 @@ class Universe:
             yield self.atom(self.single[self.column(reads)], test.box)
 
     def of(self, condition: Expr, wanted: bool = True) -> Formula:
-        """`condition = wanted` with negations pushed into the atoms."""
+        """Return the formula of `condition = wanted`, with negations pushed into the atoms."""
         match condition:
             case Literal(value=value):
                 return TRUE if bool(value) == wanted else FALSE
@@ -224,7 +224,7 @@ class Universe:
         return some(parts) if wanted else every(parts)
 
     def _against(self, coefficients: dict[int, int], op: Comparison, bound: int) -> Formula:
-        """`sum of coefficients op bound`, divided through and rounded to integers."""
+        """Return the atom of `sum of coefficients op bound`, divided through and rounded to integers."""
         terms = sorted([term for term in coefficients.items() if term[1]])
         if not terms:
             return TRUE if op.meaning(0, bound) else FALSE
@@ -234,13 +234,13 @@ class Universe:
         return self.atom(form, scaled(op, divisor, bound, self.low[form], self.high[form]))
 
     def linear(self, expr: Expr) -> tuple[dict[int, int], int]:
-        """Coefficients of columns, and a constant, that add up to the key of `expr`."""
+        """Return coefficients of columns, and a constant, that add up to the key of `expr`."""
         total: dict[int, int] = {}
         constant = self._add(total, expr, 1)
         return total, constant
 
     def _add(self, total: dict[int, int], expr: Expr, factor: int) -> int:
-        """Add the factor times the key of `expr` to the total; its constant part is returned."""
+        """Add the factor times the key of `expr` to the total; return its constant part."""
         if isinstance(expr, Read):
             known = self._column.get(expr.name)  # most often, and very often: hence no call
             column = self.column(expr) if known is None else known
@@ -268,7 +268,7 @@ class Universe:
 
 
 def every(parts: Iterable[Formula]) -> Formula:
-    """The conjunction, flattened."""
+    """Return the conjunction, flattened."""
     kept: dict[Formula, None] = {}
     for part in parts:
         if part == FALSE:
@@ -278,7 +278,7 @@ def every(parts: Iterable[Formula]) -> Formula:
 
 
 def some(parts: Iterable[Formula]) -> Formula:
-    """The disjunction, flattened; atoms of one form become one atom of all their intervals."""
+    """Return the disjunction, flattened; atoms of one form are merged into one."""
     kept: dict[Formula, None] = {}
     for part in parts:
         if part == TRUE:
@@ -294,7 +294,7 @@ def some(parts: Iterable[Formula]) -> Formula:
 
 
 def clauses(formulas: Iterable[Formula]) -> Clauses:
-    """The conjunction of `formulas`, with at most one box a form."""
+    """Return the conjunction of `formulas` as clauses, with at most one box a form."""
     boxes: dict[int, Box] = {}
     rest: dict[Formula, None] = {}
     impossible = False
@@ -311,7 +311,7 @@ def clauses(formulas: Iterable[Formula]) -> Clauses:
 
 
 def _parts(formulas: Iterable[Formula]) -> Iterator[Formula]:
-    """What a conjunction consists of, without conjunctions in it."""
+    """Yield the parts of a conjunction, with nested conjunctions flattened."""
     for part in formulas:
         if isinstance(part, Every):
             yield from _parts(part.parts)
@@ -320,7 +320,7 @@ def _parts(formulas: Iterable[Formula]) -> Iterator[Formula]:
 
 
 def lines_of(universe: Universe, table: Table) -> list[Clauses]:
-    """Every line of the table as clauses."""
+    """Return every line of the table as clauses."""
     known: dict[int, list[Formula]] = {}
     lines = []
     for line in table.lines:
@@ -336,7 +336,7 @@ def lines_of(universe: Universe, table: Table) -> list[Clauses]:
 
 
 def assumptions_of(universe: Universe, program: Program, table: Table) -> list[Clauses]:
-    """Every assumption that the table may use, in the table's order, as clauses."""
+    """Return every assumption that the table may use, in the table's order, as clauses."""
     conditions = {assumption.name: assumption.condition for assumption in program.assumptions}
     return [clauses((universe.of(conditions[name]),)) for name in table.assumptions]
 
@@ -363,7 +363,6 @@ def _is_plain(expr: Expr) -> bool:
 
 
 def _reads(condition: Expr, name: str) -> Read:
-    """The read of leaf `name` in `condition`."""
     return next(part for part in parts(condition) if isinstance(part, Read) and part.name == name)
 
 

@@ -62,7 +62,7 @@ class Ends:
         self._by_form = {form: ([cut.at for cut in cuts], cuts) for form, cuts in by_form.items()}
 
     def beyond(self, form: int, at: int) -> tuple[int, int]:
-        """The lines that any cut of a form, at an end or not, puts below it, and above it."""
+        """Return the lines that lie below a cut of a form, and those above it; the cut need not be at an end."""
         if form not in self._by_form:
             return 0, 0
         places, cuts = self._by_form[form]
@@ -71,7 +71,7 @@ class Ends:
 
 
 def _cuts(form: int, begins: Mapping[int, int], ends: Mapping[int, int]) -> list[Cut]:
-    """The cuts of one form, in order."""
+    """Return the cuts of one form, in order."""
     places = sorted({*begins, *ends})
     below, above = list[int](), list[int]()
     under = over = 0

@@ -37,7 +37,7 @@ class _Part(NamedTuple):
 def holes_between(
     extents: Mapping[Axis, Bounds], lines: Sequence[Mapping[Axis, Box]]
 ) -> list[Hole[Axis]] | None:
-    """Disjoint boxes that are all that no line fills; None past the budget."""
+    """Return disjoint boxes that make up all that no line fills; None past the budget."""
     names = list(extents)
     number = {name: at for at, name in enumerate(names)}
     if sum(prod(map(len, boxes.values())) for boxes in lines) > 4 * len(lines) + 256:
@@ -55,7 +55,7 @@ def holes_between(
 
 
 def _divided(alive: int, cuts: Sequence[Cut], edges: Sequence[Bounds]) -> list[dict[int, Bounds]] | None:
-    """The holes by numbers of axes; None past the budget."""
+    """Return the holes by numbers of axes; None past the budget."""
     holes, waiting, looked_at = list[dict[int, Bounds]](), [_Part({}, alive, cuts)], 0
     while waiting:
         part = waiting.pop()
@@ -74,7 +74,7 @@ def _divided(alive: int, cuts: Sequence[Cut], edges: Sequence[Bounds]) -> list[d
 
 
 def _best(part: _Part) -> tuple[Cut | None, list[Cut]]:
-    """The cut that parts most boxes, None where one fills the part; and the cuts at which some end."""
+    """Return the cut that parts most boxes (None where one box fills the part), and the cuts at which some box ends."""
     alive, opened, kept = part.alive, 0, list[Cut]()
     best, most = None, (-1, -1)
     for cut in part.cuts:
@@ -91,7 +91,7 @@ def _best(part: _Part) -> tuple[Cut | None, list[Cut]]:
 
 
 def _side(part: _Part, kept: Sequence[Cut], axis: int, bounds: Bounds, apart: int) -> _Part:
-    """A side of a cut, without the boxes that lie apart from it."""
+    """Return one side of a cut, without the boxes that lie on the other side."""
     cuts = [cut for cut in kept if cut[0] != axis or bounds[0] <= cut[1] < bounds[1]]
     return _Part({**part.bounds, axis: bounds}, part.alive & ~apart, cuts)
 
@@ -99,7 +99,7 @@ def _side(part: _Part, kept: Sequence[Cut], axis: int, bounds: Bounds, apart: in
 def without(
     holes: Sequence[Hole[Axis]], region: Mapping[Axis, Box], extents: Mapping[Axis, Bounds]
 ) -> Iterator[Hole[Axis]]:
-    """Disjoint boxes that are the holes without a region."""
+    """Yield disjoint boxes that make up the holes without a region."""
     narrow = {name: box for name, box in region.items() if box != (extents[name],)}
     for hole in holes:
         if all(meet(box, (hole.get(name, extents[name]),)) for name, box in narrow.items()):
@@ -111,7 +111,7 @@ def without(
 def _outside(
     hole: Hole[Axis], region: Mapping[Axis, Box], extents: Mapping[Axis, Bounds]
 ) -> Iterator[Hole[Axis]]:
-    """Disjoint boxes that are a hole without a region that meets it."""
+    """Yield disjoint boxes that make up a hole without a region that meets it."""
     inside = [hole]
     for name, box in region.items():
         before, inside = inside, []

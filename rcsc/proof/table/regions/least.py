@@ -20,14 +20,14 @@ from rcsc.proof.table.regions.splitting import Tree
 
 
 def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | NoWitness:
-    """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
+    """Find a point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
     return meeting(universe, clauses(parts), budget=budget)
 
 
 def meeting(
     universe: Universe, wanted: Clauses, near: Mapping[int, int] | None = None, budget: int = 2_000
 ) -> Point | NoWitness:
-    """A point of a conjunction as `find` has it; looked for first near another point."""
+    """Find a point of a conjunction, as `find`; look first near another point."""
     if _is_corner(wanted):
         try:
             return points.within(universe, {form: box[0] for form, box in wanted.boxes}, near or {})
@@ -49,12 +49,12 @@ def meeting(
 
 
 def _is_corner(wanted: Clauses) -> bool:
-    """Whether the clauses are bounds on forms."""
+    """Return whether the clauses are just one interval a form."""
     return not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes)
 
 
 def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | NoWitness:
-    """The least point at which all parts hold: first in the first of `columns`, and so on."""
+    """Find the least point at which all parts hold: least in the first of `columns`, then in the next, and so on."""
     wanted = clauses(parts)
     if _is_corner(wanted):
         try:
@@ -83,7 +83,7 @@ def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) 
 
 
 def inside(universe: Universe, bounds: Mapping[int, Bounds]) -> list[Formula]:
-    """A region as formulas."""
+    """Return a region as formulas."""
     return [universe.atom(form, (interval,)) for form, interval in bounds.items()]
 
 
@@ -93,13 +93,13 @@ def widest(
     columns: Sequence[int],
     holds: Callable[[Mapping[int, Bounds]], bool],
 ) -> dict[int, Bounds]:
-    """The box around `point` that is grown in the order of `columns` as far as `holds` is true of it.
+    """Grow a box around `point`, column by column in the order of `columns`, as far as `holds` is true of it.
 
     Args:
         universe: Where the columns are from.
         point: Where to begin.
-        columns: What to grow, in this order; others stay free.
-        holds: Whether what is looked for is true throughout a box.
+        columns: The columns to grow, in this order; others stay free.
+        holds: Tells whether the property wanted is true throughout a box.
     """
     box = {column: (point[column], point[column]) for column in columns}
 
@@ -120,7 +120,7 @@ def widest(
 
 
 def never(universe: Universe, box: Mapping[int, Bounds], formula: Formula) -> bool | None:
-    """Whether a formula holds nowhere in a box of columns; None where the ends of its forms do not tell.
+    """Return whether a formula holds nowhere in a box of columns; None where the ends of its forms do not decide.
 
     Each end of a form is taken at a corner of the box: `x - y` goes from -3 to 2 for x in 0 .. 2 and y in 0 .. 3.
     """
@@ -144,7 +144,7 @@ def never(universe: Universe, box: Mapping[int, Bounds], formula: Formula) -> bo
 
 
 def _ends(universe: Universe, box: Mapping[int, Bounds], form: int) -> Bounds:
-    """The least and the greatest that a form is in a box of columns."""
+    """Return the least and the greatest value of a form in a box of columns."""
     low = high = 0
     for column, k in universe.forms[form]:
         ends = box.get(column)
@@ -160,7 +160,7 @@ def _columns(universe: Universe, form: int) -> list[int]:
 
 
 def negated(universe: Universe, formula: Formula) -> Formula:
-    """The opposite of a formula."""
+    """Return the negation of a formula."""
     match formula:
         case Atom(form=form, box=box):
             return universe.atom(form, complement(box, universe.low[form], universe.high[form]))
@@ -171,7 +171,7 @@ def negated(universe: Universe, formula: Formula) -> Formula:
 
 
 def whole(line: Clauses) -> Formula:
-    """Clauses as one formula."""
+    """Return clauses as one formula."""
     if line.impossible:
         return Some(())
     return every((*(Atom(form, box) for form, box in line.boxes), *line.rest))

@@ -20,9 +20,9 @@ Multipliers: TypeAlias = tuple[tuple[int, int], ...]
 
 
 class Simplex:
-    """Bounds on forms; copied for each region, so that regions share what they share.
+    """Bounds on forms, and a vertex; copied for each region, so that regions share all that did not change.
 
-    Columns alone are kept as sums of what is nonbasic, over one denominator: a form is a sum of a few of them, so that a pivot costs no
+    Columns alone are kept as sums of nonbasic forms, over one denominator: a form is a sum of a few of them, so that a pivot costs no
     more where there are many forms. Of `x + y` and `x - y`, both nonbasic, 2 x is their sum and 2 y their difference.
 
     Attributes:
@@ -43,7 +43,7 @@ class Simplex:
         self._unsure: list[int] | None = []  # forms that may be out of their bounds; None: any
 
     def copy(self) -> "Simplex":
-        """An independent copy."""
+        """Return an independent copy."""
         new = Simplex()
         new.low, new.high = self.low.copy(), self.high.copy()
         new._terms, new._d = self._terms, self._d
@@ -53,7 +53,7 @@ class Simplex:
         return new
 
     def knows(self, form: int) -> bool:
-        """Whether the form is part of this system."""
+        """Return whether the form is part of this system."""
         return form in self.low
 
     def add_column(self, form: int, low: int, high: int, near: int = 0) -> None:
@@ -88,11 +88,11 @@ class Simplex:
             self._unsure = None
 
     def value(self, form: int) -> Fraction:
-        """The form's value at the present vertex."""
+        """Return the form's value at the present vertex."""
         return Fraction(self._scaled(form), self._d)
 
     def _scaled(self, form: int) -> int:
-        """The form's value, times the denominator."""
+        """Return the form's value times the denominator."""
         at = self._at
         return sum([k * at[column] for column, k in self._terms[form]])
 
@@ -102,14 +102,14 @@ class Simplex:
         self._at = {column: sum(map(operator.mul, row, values)) for column, row in self._rows.items()}
 
     def _row(self, form: int) -> list[int]:
-        """The form as a sum of what is nonbasic, times the denominator."""
+        """Return the form as a sum of nonbasic forms, times the denominator."""
         row = [0] * len(self._basis)
         for column, k in self._terms[form]:
             row = [a + k * b for a, b in zip(row, self._rows[column], strict=True)]
         return row
 
     def refute(self) -> Multipliers | None:
-        """Multipliers that no point survives, or None: then the vertex is within all bounds."""
+        """Return multipliers that prove that no point exists; or None, with the vertex within all bounds."""
         if self._unsure is not None and self._violated(self._unsure) is None:
             self._unsure = []
             return None
@@ -125,7 +125,7 @@ class Simplex:
         return None
 
     def _violated(self, forms: Iterable[int]) -> tuple[int, bool] | None:
-        """The first of some forms out of its bounds, and whether it must grow."""
+        """Return the first of the forms that is out of its bounds, and whether it must grow."""
         d, at, terms, low, high = self._d, self._at, self._terms, self.low, self.high
         violated: tuple[int, bool] | None = None
         for form in forms:
@@ -140,7 +140,7 @@ class Simplex:
         return violated
 
     def minimise(self, form: int) -> Fraction:
-        """The least value of a form, where the vertex goes; it must be within all bounds (`refute`)."""
+        """Move the vertex to where a form is least, and return that value; it must be within all bounds (`refute`)."""
         while True:
             if form in self._basis:
                 j, up = self._basis.index(form), False
@@ -179,7 +179,7 @@ class Simplex:
             self._pivot(leaving[0], self._row(leaving[0]), j, leaving[1])
 
     def _entering(self, row: list[int], up: bool) -> int | None:
-        """Position of the first nonbasic form that can move the row's form the right way."""
+        """Return the position of the first nonbasic form that can move the row's form the right way."""
         entering: int | None = None
         for j, a in enumerate(row):
             if a:
@@ -215,7 +215,7 @@ class Simplex:
 
 
 def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Simplex | None:
-    """A system at a vertex where `columns` are integers, by bounding one fraction after the other.
+    """Find a vertex at which `columns` are integers, by bounding one fraction after the other; return its system.
 
     Args:
         simplex: The system; it is changed.
@@ -226,7 +226,7 @@ def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Si
         None when there is none.
 
     Raises:
-        TimeoutError: When the patience is at its end.
+        TimeoutError: The patience is at its end.
     """
     waiting = [simplex]
     while waiting:
@@ -247,10 +247,10 @@ def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Si
 
 
 def least_point(simplex: Simplex, columns: Sequence[int], patience: int) -> list[int] | None:
-    """The least integers that `columns` can be together, the first compared first.
+    """Find the least integers that `columns` can be together, the first compared first.
 
-    Each is put to the least integer that it can be, given those before; where a later one finds no integer, to the next. What a
-    column can be is an interval, so that past the first integer outside there is none.
+    Each gets the least integer possible with those before; where a later one then finds none, it gets the next. The values that a
+    column can have are an interval, so that past the first integer outside there is none.
 
     Args:
         simplex: The system; it is changed.
@@ -261,7 +261,7 @@ def least_point(simplex: Simplex, columns: Sequence[int], patience: int) -> list
         None when there are none.
 
     Raises:
-        TimeoutError: When the patience is at its end.
+        TimeoutError: The patience is at its end.
     """
     if simplex.refute() is not None:
         return None

@@ -34,7 +34,7 @@ Cell: TypeAlias = dict[Axis, Bounds]
 
 
 class BudgetError(Exception):
-    """A search for gaps looked at more than `BUDGET`; whether there is one (or another one) is open."""
+    """A search for gaps looked at more than `BUDGET`; whether there is a gap (or another one) is open."""
 
 
 @dataclass(slots=True)
@@ -55,7 +55,7 @@ class Boxes(Generic[Axis]):
         return tuple(self.extents)
 
     def dead(self) -> list[int]:
-        """Lines that nothing matches."""
+        """Return the lines that no input matches."""
         return [at for at, boxes in enumerate(self.lines) if any(not box for box in boxes.values())]
 
     def overlaps(self) -> Iterator[tuple[int, int]]:
@@ -65,7 +65,7 @@ class Boxes(Generic[Axis]):
                 yield at, other
 
     def meeting(self) -> Iterator[tuple[int, int]]:
-        """Each line that overlaps a later one, with the mask of those later ones."""
+        """Yield each line that overlaps a later one, with the mask of those later ones."""
         everyone = (1 << len(self.lines)) - 1
         for at in self.dead():
             everyone &= ~(1 << at)
@@ -112,7 +112,7 @@ class Boxes(Generic[Axis]):
             yield box, idle | axis.meeting(box)
 
     def sliced(self) -> dict[Axis, "Sliced"]:
-        """Each axis in slices, with the lines that hold in each."""
+        """Return each axis in slices, with the lines that hold in each."""
         everyone = (1 << len(self.lines)) - 1
         return {
             name: Sliced.of(self.extents[name], stated, everyone & ~_any(stated.values()))
@@ -120,7 +120,7 @@ class Boxes(Generic[Axis]):
         }
 
     def piece(self, sign: int, box: BoxLine[Axis]) -> "Piece[Axis]":
-        """A box as it is counted."""
+        """Return a box as a piece that adds its inputs to the count, or (`sign` -1) takes them away."""
         sizes = [1]
         for name in reversed(self.names):
             low, high = self.extents[name]
@@ -129,7 +129,7 @@ class Boxes(Generic[Axis]):
         return Piece(sign, box, sizes)
 
     def volume(self) -> int:
-        """How many inputs there are."""
+        """Return the number of all inputs."""
         return prod(high - low + 1 for low, high in self.extents.values())
 
 
@@ -153,7 +153,7 @@ class Sliced:
 
     @classmethod
     def of(cls, extent: Bounds, stated: Mapping[Box, int], idle: int) -> "Sliced":
-        """An axis with the boxes that lines state on it; `idle` are those that state none."""
+        """Slice an axis by the boxes that lines state on it; `idle` are the lines that state none."""
         changes: dict[int, int] = {}
         for box, mask in stated.items():
             for low, high in joined(box):  # intervals that met would undo each other
@@ -171,18 +171,18 @@ class Sliced:
             yield from range(max(bisect_right(self.lows, low) - 1, 0), bisect_right(self.lows, high))
 
     def meeting(self, box: Box) -> int:
-        """The lines that hold somewhere in the box."""
+        """Return the lines that hold somewhere in the box."""
         return _any(self.masks[at] for at in self.among(box))
 
     def also(self, bit: int, box: Box | None) -> "Sliced":
-        """The same with one line more, by its bit; without a box it holds everywhere."""
+        """Return the axis with one more line, given by its bit; without a box it holds everywhere."""
         masks = list(self.masks)
         for at in range(len(masks)) if box is None else self.among(box):
             masks[at] |= bit
         return Sliced(self.lows, self.cuts, masks, self.idle | bit if box is None else self.idle)
 
     def runs(self, alive: int) -> Iterator[tuple[Bounds, int]]:
-        """Slices joined where the same of these lines hold, with those lines."""
+        """Yield slices joined where the same of these lines hold, with those lines."""
         begun, before = self.lows[0], self.masks[0] & alive
         for (low, _), mask in zip(self.cuts, self.masks, strict=True):
             holding = mask & alive
@@ -213,16 +213,16 @@ class Gaps(Generic[Axis]):
     nothing is bisected (`rcsc.proof.solvers.search.lowest`): each question of a bisection would be such a search of its own.
 
     How many inputs lines fill together is counted by inclusion and exclusion. Lines no two of which overlap are counted as they are;
-    of every other line what it adds to them: its size, less what it shares with each of them, less what it and another such line
-    both add, and so on. For `a` = 0 .. 6, `b` = 5 .. 9 of 0 .. 9 that is 7 + (5 - 2) = 10, all there are. Where this takes too many
-    terms, lines are left out of the count; what is counted is then too little, which only makes the search longer.
+    every other line adds its size, less what it shares with each of them, less what it and another such line both
+    add, and so on. For `a` = 0 .. 6, `b` = 5 .. 9 of 0 .. 9 that is 7 + (5 - 2) = 10, all there are. Where this takes too many
+    terms, lines are left out of the count; the count is then too small, which only makes the search longer.
 
-    Nothing is counted where lines overlap and what they leave open is known as boxes (`holes`): the least place is then that of a hole.
+    Nothing is counted where lines overlap and the gaps are known as boxes (`holes`): the least place is then that of a hole.
 
     Attributes:
         pieces: The terms of the count; none where the holes are known.
         exact: Whether every line is in it, or the holes are known.
-        holes: What is left open, if known, without the regions that were last shown.
+        holes: The gaps as boxes, if known, without the regions that were last shown.
     """
 
     table: Boxes[Axis]
@@ -237,7 +237,7 @@ class Gaps(Generic[Axis]):
 
     @classmethod
     def of(cls, table: Boxes[Axis], *, disjoint: bool) -> "Gaps[Axis]":
-        """The search of a table; `disjoint` where no two of its lines overlap."""
+        """Prepare the search of a table; `disjoint` says that no two of its lines overlap."""
         holes = None if disjoint else holes_between(table.extents, table.lines)
         if holes is not None:
             return cls(table, (), exact=True, holes=holes)
@@ -254,9 +254,9 @@ class Gaps(Generic[Axis]):
         return self.table.volume() - filled
 
     def least(self, shown: Sequence[BoxLine[Axis]]) -> Cell[Axis] | None:
-        """The least cell outside all lines and outside the regions shown, whose least place is the least of all.
+        """Return the least cell outside all lines and outside the regions shown; None where there is none.
 
-        None where there is none.
+        Its least place is the least of all.
 
         Raises:
             BudgetError: It was not found within `BUDGET`, where the count is not exact; or to cut the regions shown out of the holes takes
@@ -275,7 +275,7 @@ class Gaps(Generic[Axis]):
         return self._search(0, alive, below[::-1], pieces)
 
     def _least_hole(self, holes: list[Hole[Axis]], shown: Sequence[BoxLine[Axis]]) -> Cell[Axis] | None:
-        """The hole with the least place of all, once the regions shown are taken out; they are those shown before, and more."""
+        """Return the hole with the least place, after cutting out the regions shown: those of earlier calls, and more."""
         extents = self.table.extents
         for region in shown[len(self._shown) :]:
             self._looked_at += len(holes)
@@ -292,7 +292,7 @@ class Gaps(Generic[Axis]):
         return min(cells, key=lambda cell: [low for low, _ in cell.values()], default=None)
 
     def _axes(self, shown: Sequence[BoxLine[Axis]]) -> dict[Axis, "Sliced"]:
-        """The axes in slices, with the lines and after them the regions shown: those shown before, and more."""
+        """Return the axes in slices, with the lines and, after them, the regions shown: those of earlier calls, and more."""
         axes = self.table.sliced() if self._sliced is None else self._sliced
         for region in shown[len(self._regions) :]:
             bit = 1 << len(self.table.lines) + len(self._regions)
@@ -308,7 +308,7 @@ class Gaps(Generic[Axis]):
         axes: Sequence[tuple["Sliced", int]],
         pieces: Sequence[Piece[Axis]],
     ) -> Cell[Axis] | None:
-        """The least cell from an axis on; each axis comes with the lines that look at none from there on."""
+        """Return the least cell from an axis on. Each axis comes with the lines that look at no axis from there on."""
         names = self.table.names[depth:]
         if not alive:
             return {name: self.table.extents[name] for name in names}
@@ -329,7 +329,7 @@ class Gaps(Generic[Axis]):
     def _short(
         self, depth: int, alive: int, axis: "Sliced", pieces: Sequence[Piece[Axis]]
     ) -> Iterator[tuple[Bounds, int]]:
-        """Parts of the axis at `depth` that the pieces do not fill, with the lines that hold in each; counted in one sweep."""
+        """Yield the parts of the axis at `depth` that the pieces do not fill, with the lines that hold in each; one sweep counts them."""
         name = self.table.names[depth]
         extents = [self.table.extents[other] for other in self.table.names[depth + 1 :]]
         whole = prod(high - low + 1 for low, high in extents)
@@ -348,7 +348,7 @@ class Gaps(Generic[Axis]):
                 yield bounds, holding
 
     def grown(self, cell: Cell[Axis], shown: Sequence[BoxLine[Axis]]) -> dict[Axis, Box]:
-        """A maximal region around the cell that no line and no region shown touches, grown in the order of axes."""
+        """Grow the cell, in the order of axes, to a maximal region that no line and no region shown touches."""
         axes = self._axes(shown)
         near = {name: axis.meeting(((cell[name][0],) * 2,)) for name, axis in axes.items()}
         region: dict[Axis, Box] = {}
@@ -363,7 +363,7 @@ class Gaps(Generic[Axis]):
 
 
 class Counting(Generic[Axis]):
-    """Size of what lines fill together, by inclusion and exclusion (`Gaps`).
+    """The number of inputs that lines fill together, by inclusion and exclusion (`Gaps`).
 
     Attributes:
         pieces: Boxes with signs, whose sizes add up to it.
@@ -435,7 +435,7 @@ def parting(lines: Sequence[BoxLine[Axis]]) -> tuple[Axis, ...] | None:
 
 
 def _apart(stated: Mapping[Box, int]) -> dict[Box, int]:
-    """For each box that lines state on an axis the lines that state one which it does not meet."""
+    """Return, for each box that lines state on an axis, the lines whose box does not meet it."""
     everyone = _any(stated.values())
     if all(len(box) == 1 for box in stated):
         return {box: everyone & ~meeting for box, meeting in _intervals_meeting(stated, 0)}
@@ -443,7 +443,7 @@ def _apart(stated: Mapping[Box, int]) -> dict[Box, int]:
 
 
 def common(first: BoxLine[Axis], second: BoxLine[Axis]) -> dict[Axis, Box] | None:
-    """The inputs of both; None where there are none."""
+    """Return the inputs of both boxes; None where there are none."""
     shared = dict(first)
     for name, box in second.items():
         known = shared.get(name)
@@ -482,7 +482,7 @@ def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
 
 
 def slices(extent: Bounds, boxes: Iterable[Box]) -> list[Bounds]:
-    """The extent, cut wherever a box begins or ends."""
+    """Cut the extent wherever a box begins or ends."""
     starts = {extent[0]}
     for box in boxes:
         for low, high in box:
@@ -492,7 +492,7 @@ def slices(extent: Bounds, boxes: Iterable[Box]) -> list[Bounds]:
 
 
 def bits_of(mask: int) -> Iterator[int]:
-    """Positions of the bits that are set, from the lowest."""
+    """Yield the positions of the bits that are set, from the lowest."""
     while mask:
         lowest = mask & -mask
         yield lowest.bit_length() - 1

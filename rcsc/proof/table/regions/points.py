@@ -21,11 +21,11 @@ _ROUNDS = 200
 
 
 def within(universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]) -> Point | NoWitness:
-    """A point within the bounds on forms, of leaves only, all put to one system.
+    """Find a point within the bounds on forms, of leaves only, all put to one system.
 
     First one near a given point is tried (`projected`). Then each bound on several columns is drawn in by half the
-    sum of its coefficients: a point of what is left stays within the bounds when it is rounded to integers. Only
-    where nothing is left are fractions bounded one after the other.
+    sum of its coefficients: any point of the smaller region stays within the bounds when it is rounded to integers.
+    Only where that region is empty are fractions bounded one after the other.
     """
     forms, singles = universe.forms, universe.single
     if _is_opaque(universe, bounds):
@@ -53,7 +53,7 @@ def within(universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, 
 def least_within(
     universe: Universe, bounds: Mapping[int, Bounds], columns: Sequence[int]
 ) -> Point | NoWitness:
-    """The least point within the bounds on forms, of leaves only, in the order of the columns given.
+    """Find the least point within the bounds on forms, of leaves only, in the order of the columns given.
 
     Raises:
         TimeoutError: It was not found soon enough.
@@ -71,13 +71,13 @@ def least_within(
 
 
 def _is_opaque(universe: Universe, bounds: Mapping[int, Bounds]) -> bool:
-    """Whether a bound speaks of a term that is not a leaf."""
+    """Return whether a bound speaks of a term that is not a leaf."""
     opaque = universe.opaque
     return bool(opaque) and not opaque.isdisjoint(c for form in bounds for c, _ in universe.forms[form])
 
 
 def _of_planes(universe: Universe, bounds: Mapping[int, Bounds]) -> set[int]:
-    """The columns of all forms that have several."""
+    """Return the columns of all forms that have several."""
     forms = universe.forms
     return {column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]}
 
@@ -90,7 +90,7 @@ def _system(
     *,
     draw_in: bool = False,
 ) -> Simplex:
-    """The bounds as a system over the columns used, at a point near one given."""
+    """Build the system of the bounds over the columns used, at a point near the one given."""
     forms, singles = universe.forms, universe.single
     system = Simplex()
     for column in used:
@@ -110,7 +110,7 @@ def _system(
 def projected(
     universe: Universe, bounds: Mapping[int, Bounds], near: Mapping[int, int]
 ) -> dict[int, int] | None:
-    """The columns of a point within the bounds, by projecting a point onto one bound after the other; None where that does not end soon.
+    """Find the columns of a point within the bounds by projecting onto one bound after the other; None where that does not end soon.
 
     Source: Agmon, The relaxation method for linear inequalities, 1954. It guesses in floating point; what it returns was checked exactly.
     """
@@ -141,7 +141,7 @@ _Plane: TypeAlias = tuple[Form, int, int, int]
 
 
 def _relaxed(planes: Sequence[_Plane], ends: Mapping[int, Bounds], near: Mapping[int, int]) -> dict[int, int]:
-    """The point near another at which projecting comes to rest or is given up, rounded, within the bounds of columns."""
+    """Project a point onto the planes until it rests or the sweeps are used up; return it rounded, within the columns' bounds."""
     at = {column: float(min(max(near.get(column, 0), low), high)) for column, (low, high) in ends.items()}
     for _ in range(_SWEEPS):
         moved = False
@@ -161,7 +161,7 @@ def _relaxed(planes: Sequence[_Plane], ends: Mapping[int, Bounds], near: Mapping
 
 
 def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int, int]) -> Point:
-    """The point with the least value of every column that no bound on several columns speaks of."""
+    """Complete a point: every column that no bound on several columns mentions gets its least value."""
     return {
         column: at[column] if column in at else bounds.get(form, (universe.low[form],))[0]
         for column, form in enumerate(universe.single)

@@ -70,14 +70,14 @@ class Rests:
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """Not proved: the region holds a finding, or nobody could decide it."""
+    """Not proved: the region holds a finding, or is undecided."""
 
 
 Node: TypeAlias = Split | Empty | OutsideAssumption | Only | Counted | Rests | Open
 
 
 class NoWitness(Enum):
-    """What a solver says of a conjunction, where it gives no witness."""
+    """A solver's answer about a conjunction, where it gives no witness."""
 
     NONE = auto()
     UNKNOWN = auto()
@@ -96,14 +96,14 @@ class Question:
 
 @dataclass(slots=True)
 class Search:
-    """What a search found.
+    """The results of a search.
 
     Attributes:
         nodes: The tree in preorder; a proof when there is no `Open`.
         overlaps: Each overlapping pair of lines with a point in both.
         gaps: Regions (bounds by form) that no line matches, each with a point of it.
         witnesses: Inputs a solver gave at which not exactly one line holds, not yet told apart.
-        doubtful: What it was asked of the regions in which it gave them: other pairs may overlap there, and there may be a gap, too.
+        doubtful: The questions to which it gave them: other pairs may overlap in those regions, and there may be a gap, too.
         undecided: How many regions stayed undecided.
         used: Assumptions that some leaf rests on, by position.
     """
@@ -160,7 +160,7 @@ class Candidate:
 
 
 def _merged(index: int, boxes: Mapping[int, Box], rest: Formula) -> Candidate | None:
-    """Atoms that the rest came down to, joined to the boxes."""
+    """Move atoms of the rest into the boxes; None where a box becomes empty."""
     merged, others = dict(boxes), []
     for part in rest.parts if isinstance(rest, Every) else (rest,):
         if isinstance(part, Atom):
@@ -173,7 +173,7 @@ def _merged(index: int, boxes: Mapping[int, Box], rest: Formula) -> Candidate | 
 
 
 def simplified(formula: Formula, form: int, low: int, high: int) -> Formula:
-    """The formula where `form` is in `low .. high`."""
+    """Return the formula simplified for `form` in `low .. high`."""
     match formula:
         case Atom(form=bounded, box=box):
             if bounded != form:
@@ -189,7 +189,7 @@ def simplified(formula: Formula, form: int, low: int, high: int) -> Formula:
 
 
 def atoms(formula: Formula) -> Iterator[Atom]:
-    """Every atom in the formula."""
+    """Yield every atom in the formula."""
     if isinstance(formula, Atom):
         yield formula
     else:
@@ -226,5 +226,5 @@ class Region:
 
     @property
     def many(self) -> int:
-        """How many lines may hold in it."""
+        """The number of lines that may hold in it."""
         return self.plain.bit_count() + len(self.lines)

@@ -62,7 +62,7 @@ NOWHERE: Score = (-1, -1, 0, 0)
 
 
 class Survey(NamedTuple):
-    """What is seen of a region before it is split.
+    """A region's best cut and the lines that hold all over it, found before it is split.
 
     Attributes:
         best: The best cut of the lines that are intervals.
@@ -123,7 +123,7 @@ class Tree:
                 self.root.known = OutsideAssumption(i)
 
     def run(self) -> Search:
-        """Decide every region, in preorder; what was found stands where the rest is given up."""
+        """Decide every region, in preorder; findings stand even where the rest is given up."""
         stack = [self.root]
         while stack:
             if smt.gives_up("how the lines share the inputs") or smt.charge(STEPS_OF_A_NODE):
@@ -138,7 +138,7 @@ class Tree:
         return self.search
 
     def _decide(self, region: Region) -> tuple[Node, list[Region]]:
-        """A leaf, or a split and its two regions."""
+        """Return a leaf, or a split and its two regions."""
         if region.known is not None:
             if isinstance(region.known, OutsideAssumption):
                 self.search.used.add(region.known.assumption)
@@ -161,14 +161,14 @@ class Tree:
     # --- findings ----------------------------------------------------------------------
 
     def _all_known(self, region: Region) -> bool:
-        """Whether no further split could find another pair (two lines hold, so no gap)."""
+        """Return whether no further split could find another pair (two lines hold, so there is no gap)."""
         others = self._numbers(region)
         return all(pair in self.search.overlaps for pair in combinations(others, 2))
 
     def _probe(
         self, region: Region, survey: Survey, pairs: list[tuple[int, int]]
     ) -> tuple[Node, list[Region]]:
-        """Look for a point of a region that is wrong at every point."""
+        """Find a point of a region that is wrong at every point; where there is none yet, prove it empty, split it, or ask the solver."""
         multipliers = self._refute(region)
         if multipliers is not None:
             return Empty(multipliers), []
@@ -189,7 +189,7 @@ class Tree:
         return (Open(), []) if settled else self._narrow(region, survey)
 
     def _past(self, region: Region) -> Node:
-        """Leave a region past the budget to the solver, as long as these are few: the rest is undecided."""
+        """Leave a region past the budget to the solver while such regions are few; the rest stays undecided."""
         self.past += 1
         if self.past <= MOST_PAST:
             return self._ask(region)
@@ -197,7 +197,7 @@ class Tree:
         return Open()
 
     def _ask(self, region: Region) -> Node:
-        """Leave the region to the solver."""
+        """Ask the solver about the region; after enough regions without an answer none is asked."""
         if self.search.undecided >= _PATIENCE:
             self.search.undecided += 1
             return Open()
@@ -216,24 +216,24 @@ class Tree:
         return Open()
 
     def _is_opaque(self, region: Region) -> bool:
-        """Whether a bound speaks of a term that is not a leaf."""
+        """Return whether a bound speaks of a term that is not a leaf."""
         columns, forms = self.universe.columns, self.universe.forms
         return any(columns[column].opaque for form in region.bounds for column, _ in forms[form])
 
     def _fractional(self, region: Region) -> int:
-        """A column (as a form) that the vertex does not give an integer; there is one."""
+        """Return a column (as a form) to which the vertex gives no integer; there must be one."""
         values = ((form, region.simplex.value(form)) for form in self._known(region).values())
         return next(form for form, value in values if value.denominator != 1)
 
     def _known(self, region: Region) -> dict[int, int]:
-        """The columns that the region's simplex knows, with their forms."""
+        """Return the columns that the region's simplex knows, with their forms."""
         singles = enumerate(self.universe.single)
         return {column: form for column, form in singles if region.simplex.knows(form)}
 
     def _point(self, region: Region) -> Point | None:
-        """The vertex, or a point near it where it is not one of integers, with the least value of every column that is left open.
+        """Return the vertex, or a point of integers near it, with the least value for every column left open.
 
-        None where no point of integers is found.
+        Return None where no point of integers is found.
         """
         vertex = {column: region.simplex.value(form) for column, form in self._known(region).items()}
         at: Mapping[int, int] | None = {column: int(value) for column, value in vertex.items()}
@@ -247,11 +247,11 @@ class Tree:
     # --- splits ------------------------------------------------------------------------
 
     def _numbers(self, region: Region) -> list[int]:
-        """The lines that may hold somewhere in a region."""
+        """Return the lines that may hold somewhere in a region."""
         return sorted([*bits_of(region.plain), *(line.index for line in region.lines)])
 
     def _candidates(self, region: Region) -> list[Candidate]:
-        """These lines, as far as the region leaves them open."""
+        """Return the region's lines, each with the conditions that the region leaves open."""
         plain = []
         for number in bits_of(region.plain):
             boxes = {form: meet(box, (self._range(region, form),)) for form, box in self._lines[number].boxes}
@@ -260,7 +260,7 @@ class Tree:
         return sorted([*plain, *region.lines], key=lambda line: line.index)
 
     def _survey(self, region: Region) -> Survey:
-        """See which cuts part the lines that are intervals, and which lines hold; cuts that part none are dropped."""
+        """Find the cut that best parts the lines that are intervals, and the lines that hold; drop cuts that part none."""
         plain, opened, kept, best = region.plain, 0, list[Cut](), NOWHERE
         for cut in region.cuts:
             here = cut[2] & plain
@@ -276,7 +276,7 @@ class Tree:
         return Survey(best, sorted(holding))
 
     def _narrow(self, region: Region, survey: Survey) -> tuple[Node, list[Region]]:
-        """Count boxes where boxes are all that is left, else split."""
+        """Count the lines' boxes where only boxes are left, else split."""
         if region.carve:
             return self._carve(region, survey)
         if all(cut.form in self._singles for cut in region.cuts) and all(
@@ -298,7 +298,7 @@ class Tree:
         return self._split(region, *self._best(region, region.lines, survey.best))
 
     def _carve(self, region: Region, survey: Survey) -> tuple[Node, list[Region]]:
-        """One split toward the part that is to be cut out."""
+        """Split once toward the part that is to be cut out."""
         (form, (low, high)), *later = region.carve
         least, greatest = self._range(region, form)
         if (low <= least and high >= greatest) or high < least or low > greatest:
@@ -311,7 +311,7 @@ class Tree:
         return node, children
 
     def _best(self, region: Region, candidates: Sequence[Candidate], best: Score) -> tuple[int, int]:
-        """The form and cut that leave fewest lines on both sides together.
+        """Return the form and cut that leave fewest lines on both sides together.
 
         Args:
             region: Where.
@@ -347,7 +347,7 @@ class Tree:
         return -best[2], -best[3]
 
     def _split(self, region: Region, form: int, cut: int, rounds: int = 0) -> tuple[Node, list[Region]]:
-        """Both sides of `form <= cut`; a side that linear arithmetic finds empty is a leaf at once."""
+        """Split at `form <= cut`; a side that linear arithmetic finds empty is a leaf at once."""
         least, greatest = self._range(region, form)
         if not least <= cut < greatest:
             return self._without_full_boxes(region)
@@ -395,7 +395,7 @@ class Tree:
         )
 
     def _side(self, region: Region, form: int, bounds: Bounds, apart: int) -> Region:
-        """A side of a split, without the lines that lie apart from it."""
+        """Return one side of a split, without the lines that lie on the other side."""
         low, high = bounds
         lines = [kept for line in region.lines if (kept := line.within(form, low, high)) is not None]
         cuts = [cut for cut in region.cuts if cut[0] != form or low <= cut[1] < high]
@@ -417,12 +417,12 @@ class Tree:
     # --- linear arithmetic -------------------------------------------------------------
 
     def _has_arithmetic(self, region: Region, form: int) -> bool:
-        """Whether a bound on a form of several columns plays a part."""
+        """Return whether a bound on a form of several columns plays a part."""
         forms = self.universe.forms
         return len(forms[form]) > 1 or any(len(forms[bound]) > 1 for bound in region.bounds)
 
     def _refute(self, region: Region) -> Multipliers | None:
-        """Multipliers that show the region to be empty; else its simplex stands at a vertex."""
+        """Return multipliers that show the region to be empty; else None, with its simplex at a vertex."""
         if not region.stale:
             return None
         simplex, changed = region.simplex.copy(), False
@@ -448,7 +448,7 @@ class Tree:
 
 
 def _defect(boxes: Boxes[int], *, cover: bool) -> Cell[int] | None:
-    """A cell in which two lines hold, or (with `cover`) none; None where there is none."""
+    """Return a cell in which two lines hold, or (with `cover`) none; None where there is no such cell."""
     pair = next(boxes.overlaps(), None)
     if pair is None:
         return Gaps.of(boxes, disjoint=True).least(()) if cover else None

@@ -50,26 +50,26 @@ class Part:
 
     @property
     def name(self) -> str:
-        """As a field is written; of one bit with both ends, which no element of an array has."""
+        """The name as a field is written; a single bit has both ends, too, as no array element has."""
         return f"{self.leaf}[{self.high}..{self.low}]"
 
     @property
     def bits(self) -> int:
-        """How many they are."""
+        """The number of bits."""
         return self.high - self.low + 1
 
     @property
     def kind(self) -> Int:
-        """The values that they have as a number."""
+        """The type of the bits as a number."""
         return Int(0, (1 << self.bits) - 1)
 
     @property
     def ones(self) -> int:
-        """The word that has ones here and nowhere else."""
+        """The mask with ones at these bits and nowhere else."""
         return ((1 << self.bits) - 1) << self.low
 
     def of(self, leaf: Variable) -> Expr:
-        """The bits as a number, of the word in whole."""
+        """Return the bits as a number, computed from the whole word."""
         number: Expr = Read(leaf.name, leaf.type)
         top = key_bounds(leaf.type)[1] >> self.low
         if self.low:
@@ -78,7 +78,7 @@ class Part:
 
     @classmethod
     def named(cls, name: str) -> "Part | None":
-        """The part with this name; None for a leaf."""
+        """Return the part with this name; None for a leaf."""
         leaf, bracket, ends = name.rpartition("[")
         high, dots, low = ends.removesuffix("]").partition("..")
         return cls(leaf, int(high), int(low)) if bracket and dots else None
@@ -89,13 +89,13 @@ Words = Mapping[str, tuple[Part, ...]]
 
 
 def kind_of(kinds: Mapping[str, Scalar], name: str) -> Scalar:
-    """The kind of a leaf or of a part."""
+    """Return the kind of a leaf or of a part."""
     part = None if name in kinds else Part.named(name)
     return kinds[name] if part is None else part.kind
 
 
 def words_of(program: Program, table: Table) -> Words | None:
-    """The words that the table's tests take apart; None where some test is no box, of leaves or of parts."""
+    """Return the words that the table's tests split; None where some test is no box of leaves or of parts."""
     kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
     tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
     looked_at: dict[str, list[Test]] = {}
@@ -114,7 +114,7 @@ def words_of(program: Program, table: Table) -> Words | None:
 
 
 def boxes_of(test: Test, parts: Sequence[Part]) -> dict[str, Box] | None:
-    """The test of a split word as a box of its parts; None where it is none."""
+    """Return the test of a split word as boxes of its parts; None where it is none."""
     boxes: dict[str, Box] = {}
     for condition in conjuncts(test.condition):
         mask = _mask(condition)
@@ -127,7 +127,7 @@ def boxes_of(test: Test, parts: Sequence[Part]) -> dict[str, Box] | None:
 
 
 def mask_text(parts: Sequence[Part], region: Mapping[str, Box], high: int, low: int) -> str | None:
-    """The digits of bits `high .. low` for which the parts have what the region says; None where no mask says it."""
+    """Spell the region as a mask of bits `high .. low`; None where no mask says it."""
     digits = ["x"] * (high + 1)
     for part in parts:
         box = region.get(part.name)
@@ -144,7 +144,7 @@ def mask_text(parts: Sequence[Part], region: Mapping[str, Box], high: int, low: 
 
 
 def _cube(box: Box, bits: int) -> tuple[int, int] | None:
-    """The bits that all keys have alike, and their values; None where other keys have these, too."""
+    """Return the bits on which all keys agree, and their values; None where further keys match these, too."""
     keys = [key for first, last in box for key in range(first, last + 1)]
     alike = (1 << bits) - 1
     for key in keys:
@@ -156,7 +156,7 @@ def _cube(box: Box, bits: int) -> tuple[int, int] | None:
 
 
 def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
-    """The parts into which tests split a word, none where they are not about its bits."""
+    """Return the parts into which tests split a word; none where the tests are not about its bits."""
     if not isinstance(kind, Int) or kind.low != 0 or kind.unit or (kind.high + 1).bit_count() != 1:
         return ()
     width = max(kind.high.bit_length(), 1)
@@ -176,7 +176,7 @@ def _parts(leaf: str, kind: Scalar, tests: Sequence[Test]) -> tuple[Part, ...]:
 
 
 def _mask(condition: Expr) -> Mask | None:
-    """The mask that a condition is; of a word compared as a whole, too."""
+    """Return the mask that a condition states, also for a word compared as a whole; None for any other."""
     match condition:
         case Apply(op=Op.EQ, args=(Read(type=Int()) as word, Literal(value=value))):
             part = field_of(word)
@@ -185,7 +185,7 @@ def _mask(condition: Expr) -> Mask | None:
 
 
 def _fields(condition: Expr) -> Iterator[Field]:
-    """Every field that the condition looks at."""
+    """Yield every field that the condition looks at."""
     part = field_of(condition)
     if part is not None:
         yield part
@@ -195,7 +195,7 @@ def _fields(condition: Expr) -> Iterator[Field]:
 
 
 def _of_mask(mask: Mask, parts: Sequence[Part]) -> dict[str, Box]:
-    """What the mask says of each part that it looks at."""
+    """Return the mask as boxes of the parts that it looks at."""
     boxes = {}
     for part in parts:
         care = (mask.care & part.ones) >> part.low
@@ -207,7 +207,7 @@ def _of_mask(mask: Mask, parts: Sequence[Part]) -> dict[str, Box]:
 
 
 def _of_condition(condition: Expr, parts: Sequence[Part]) -> dict[str, Box] | None:
-    """What a condition says that looks at one part alone."""
+    """Return a condition on one part as the box of that part; None where it is none."""
     fields = list(_fields(condition))
     [part] = [part for part in parts if part.low <= fields[0].low <= part.high]
     axis = Variable(VariableName(part.name), Kind.INPUT, part.kind, 0)
@@ -216,7 +216,7 @@ def _of_condition(condition: Expr, parts: Sequence[Part]) -> dict[str, Box] | No
 
 
 def _within(condition: Expr, part: Part) -> Expr:
-    """The condition with the part in place of its word."""
+    """Return the condition with the part in place of its word."""
     field = field_of(condition)
     if field is None:
         return rebuilt(condition, lambda operand: _within(operand, part))

@@ -33,7 +33,7 @@ from rcsc.lang.model import I64_MIN, Bool, key_bounds
 
 
 def index_of(c: CProgram, group: Group, name: str) -> Code:
-    """Give the place of the classes together: in mixed radix, the last one fastest."""
+    """Return the joint index of the classes, in mixed radix, the last one fastest."""
     index: Code | None = None
     for number, probe in enumerate(group):
         leaf_class = _class(c, probe.index, f"{name}_{number}")
@@ -71,7 +71,7 @@ def _class(c: CProgram, index: Index, name: str) -> Code:
 
 
 def _above(c: CProgram, kind: model.Scalar, place: Place, low: int) -> Code:
-    """How far a value is above the least that has a class."""
+    """Return code for the distance of a value from the least that has a class."""
     if low == 0:
         return place
     word, sign = word_type(*key_bounds(kind)), "+" if I64_MIN < low < 0 else "-"
@@ -82,21 +82,21 @@ def _above(c: CProgram, kind: model.Scalar, place: Place, low: int) -> Code:
 
 
 def _classify(c: CProgram, name: str, doc: str, value: Code, kind: str, body: Body) -> Code:
-    """A call of a function of its own, which finds the class of a value."""
+    """Make a function that finds the class of a value; return its call."""
     function = c.names.c.fresh(f"{c.p}_class_{name}")
     c.classifiers.append(Function(doc, f"uint32_t {function}({kind} value)", body))
     return Invoke(function, (value.inner if isinstance(value, Round) else value,))
 
 
 def _codes(index: Coded) -> Body:
-    """The class of `value`, looked up."""
+    """Return code that looks up the class of `value`."""
     head = f"RCSC_CONST_SECTION static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
     rows = tuple(wrapped(Constant(number, "uint32_t") for number in index.classes))
     return Frame((head,), rows, "};"), Leave(Element(Name("classes"), Name("value")))
 
 
 def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
-    """How many cuts are at most `value`, in a number of steps that depends on nothing."""
+    """Yield code that counts the cuts that are at most `value`; its number of steps depends on nothing."""
     count, cuts = Constant(len(index.cuts), "uint32_t"), Name("cuts")
     rows = tuple(wrapped(Constant(cut, wide) for cut in index.cuts))
     yield Frame((f"RCSC_CONST_SECTION static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
@@ -113,12 +113,12 @@ def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
 
 
 def bit_of(condition: Code) -> Code:
-    """Give 1 where the condition holds, else 0."""
+    """Return code that is 1 where the condition holds, else 0."""
     return Choice(condition, Constant(1, "uint32_t"), Constant(0, "uint32_t"))
 
 
 def wrapped(values: Iterable[Code], width: int = 88) -> Iterator[Line]:
-    """Values of an initialiser, as many in a line as it takes."""
+    """Yield values of an initialiser, as many in a line as fit."""
     text = ""
     for word in map(IN_C.code, values):
         if text and len(text) + len(word) > width:

@@ -35,7 +35,7 @@ FOUND, M = Name("line"), Name("m")
 
 
 def match_function(c: CProgram, table: PlanTable) -> Function:
-    """Give the function that finds the line of a table."""
+    """Return the function that finds the line of a table."""
     name = c.names.tables[table.table.name]
     doc = f"Finds the line of table {table.table.name}: its position; -1 none, -2 several."
     body = tuple(_match(c, table, name))
@@ -44,7 +44,7 @@ def match_function(c: CProgram, table: PlanTable) -> Function:
 
 
 def line_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
-    """Give the function that tells the line of a table for one state, and the one for many."""
+    """Yield the function that tells the line of a table for one state, and the one for many."""
     name = c.names.tables[table.table.name]
     doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
     found = Leave(Invoke(f"{c.p}_match_{name}", (STATE,)))

@@ -24,7 +24,7 @@ MOST_TOLD = 32
 
 
 def meaning(table: PlanTable) -> str:
-    """What a bit of a mask says, and of which line it is where its name does not tell."""
+    """Explain the bits of a mask, with the line of each where its name does not tell."""
     lines = table.lines[: table.matcher.lines]
     numbered = all(line.name == str(at) for at, line in enumerate(lines))
     bits = "bit k" if numbered else f"from the lowest bit, lines {', '.join(line.name for line in lines)}"
@@ -33,7 +33,7 @@ def meaning(table: PlanTable) -> str:
 
 
 def mask_tables(table: PlanTable) -> Iterator[Stmt]:
-    """All tables of masks as one object: one address to load."""
+    """Yield all tables of masks as one object: one address to load."""
     matcher = table.matcher
     lines = [line.name for line in table.lines[: matcher.lines]]
     bits = width(matcher.lines) if matcher.words <= 1 else WORD
@@ -53,7 +53,7 @@ def mask_tables(table: PlanTable) -> Iterator[Stmt]:
 
 
 def leaves_of(group: Group) -> str:
-    """What the classes of a group are of, in words."""
+    """Name the leaves and conditions whose classes make a group."""
     return ", ".join(
         probe.index.text if isinstance(probe.index, Truth) else probe.index.leaf for probe in group
     )
@@ -62,7 +62,7 @@ def leaves_of(group: Group) -> str:
 def _rows(
     group: Group, entries: tuple[int, ...], lines: Sequence[str], size: tuple[int, int]
 ) -> Iterator[Line]:
-    """Masks, or the words of each, from the lowest: each in a line with its class and its lines, or each run of equal ones."""
+    """Yield masks, or the words of each, from the lowest: each in a line with its class and its lines, or each run of equal ones."""
     (words, bits), classes = size, _classes(group)
     runs = [[at for at, _ in run] for _, run in groupby(enumerate(entries), key=itemgetter(1))]
     if len(entries) <= MOST_TOLD:
@@ -92,7 +92,7 @@ def mask_code(mask: int, words: int, bits: int) -> str:
 
 
 def _left(mask: int, lines: Sequence[str]) -> str:
-    """The lines that a mask leaves, by name, four or more in a row by the first and the last."""
+    """Name the lines that a mask leaves; four or more in a row by the first and the last."""
     left = [at for at in range(len(lines)) if mask >> at & 1]
     if not left or len(left) == len(lines):
         return "every line" if left else "no line"
@@ -106,12 +106,12 @@ def _left(mask: int, lines: Sequence[str]) -> str:
 
 
 def _classes(group: Group) -> list[str]:
-    """The words of each combination of classes, the last leaf's fastest."""
+    """Describe each combination of classes, the last leaf's fastest."""
     return [", ".join(words) for words in product(*(_class_words(probe.index) for probe in group))]
 
 
 def _class_words(index: Index) -> list[str]:
-    """The values of each class."""
+    """Describe the values of each class."""
     match index:
         case Truth():
             return ["false", "true"]
@@ -128,10 +128,10 @@ def _class_words(index: Index) -> list[str]:
 
 
 def word_code(value: int, bits: int, digits: int = 1) -> Name:
-    """A mask, as wide as 32 bits or 64; `digits` of it are written at least."""
+    """Spell a mask as a constant of 32 bits or 64, with at least `digits` digits."""
     return Name(f"0x{value:0{digits}x}{'ULL' if bits == 64 else 'u'}")
 
 
 def width(lines: int) -> int:
-    """Give the bits of the narrowest type with one for each line."""
+    """Return the bits of the narrowest type with one for each line."""
     return next(bits for bits in (8, 16, 32, 64) if lines <= bits)

@@ -54,7 +54,7 @@ ZERO, SEVERAL = Constant(0, "uint32_t"), Constant(-2)
 
 
 def in_windows(c: CProgram, table: PlanTable, windows: Windows, name: str) -> Iterator[Stmt]:
-    """Give the body of the function that finds the line."""
+    """Return the body of the function that finds the line."""
     matcher = table.matcher
     said = "`order` says which line a bit stands for; a mask has the bits of those that its class does not exclude."
     yield Line(f"/* {comment(f'Masks of {table.source}, window by window: {said}')} */")
@@ -73,7 +73,7 @@ def in_windows(c: CProgram, table: PlanTable, windows: Windows, name: str) -> It
 def _asked(
     c: CProgram, windows: Windows, decided: Decision, ends: Iterator[int], names: Iterator[int]
 ) -> tuple[Code, list[Let]]:
-    """Code for the window that a decision leads to, and the statements that the code reads."""
+    """Return code for the window that a decision leads to, and the statements that the code reads."""
     if isinstance(decided, End):
         return Constant(next(ends), "uint32_t"), []
     below, first = _asked(c, windows, decided.below, ends, names)
@@ -84,7 +84,7 @@ def _asked(
 
 
 def _reaches(c: CProgram, index: Index, number: int) -> Code:
-    """Whether the class is at least `number`."""
+    """Return the condition that the class is at least `number`."""
     match index:
         case Direct(leaf=leaf, type=Bool()):
             return c.text.place(leaf)
@@ -97,7 +97,7 @@ def _reaches(c: CProgram, index: Index, number: int) -> Code:
 
 
 def _found(windows: Windows, at: int, index: Code) -> Code:
-    """The word of masks of one group in the window."""
+    """Return the word of masks of one group in the window."""
     if not windows.apart:
         return Element(Element(Name(f"t.t{at}"), index), W)
     page = Element(Name(f"t.k{at}"), infix("/", W, Constant(PAGE, "uint32_t")))
@@ -107,7 +107,7 @@ def _found(windows: Windows, at: int, index: Code) -> Code:
 
 
 def _tail(c: CProgram, matcher: Matcher) -> Iterator[Stmt]:
-    """The line of the one bit that is left."""
+    """Yield code that returns the line of the one bit left."""
     yield Let("const bool", "several", infix("!=", infix("&", M, infix("-", M, ONE)), ZERO))
     lowest = Invoke(f"{c.p}_bit{WORD}", (M,), helper=f"bit{WORD}")
     none = Constant(matcher.lines) if matcher.default else Round(NONE)
@@ -121,7 +121,7 @@ def _tail(c: CProgram, matcher: Matcher) -> Iterator[Stmt]:
 
 
 def _words(matcher: Matcher, windows: Windows) -> list[list[tuple[int, ...]]]:
-    """For each group and each combination of its classes the word of every window."""
+    """Return the word of every window, for each group and each combination of its classes."""
     lines = windows.lines
     own = [sum(1 << line for line in window) for window in lines]
     known: list[dict[int, int]] = [{} for _ in lines]
@@ -137,7 +137,7 @@ def _words(matcher: Matcher, windows: Windows) -> list[list[tuple[int, ...]]]:
 
 
 def _tables(table: PlanTable, windows: Windows) -> Iterator[Stmt]:
-    """Tables of masks, a word for every window."""
+    """Yield tables of masks, with a word for every window."""
     words = _words(table.matcher, windows)
     members = [f"uint64_t t{at}[{len(rows)}][{len(windows.lines)}];" for at, rows in enumerate(words)]
     bodies = [[mask_code(_side_by_side(row), len(row), WORD) + "," for row in rows] for rows in words]
@@ -150,9 +150,9 @@ def _side_by_side(words: Sequence[int]) -> int:
 
 
 def _apart(table: PlanTable, windows: Windows) -> Iterator[Stmt]:
-    """Words of masks, each group's in a window one after another, and tables of their places.
+    """Yield the words of masks, each group's in a window one after another, and tables of their places.
 
-    Where a place of classes leads (`k`) is said once for the windows of a page; which word it is there (`c`) for each window.
+    A table `k` maps classes to a column, once for the windows of a page; a table `c` has the word's place in that column, for each window.
     """
     words: dict[tuple[int, ...], int] = {}
     pool: list[int] = []
@@ -182,7 +182,7 @@ def _apart(table: PlanTable, windows: Windows) -> Iterator[Stmt]:
 
 
 def _member(name: str, at: int | None, rows: Sequence[Sequence[int]]) -> str:
-    """The declaration of rows of numbers, as long as the longest."""
+    """Spell the declaration of rows of numbers, as long as the longest."""
     kind = _least(max(map(max, rows)))
     return f"{kind} {name}{'' if at is None else at}[{len(rows)}][{max(map(len, rows))}];"
 
@@ -190,7 +190,7 @@ def _member(name: str, at: int | None, rows: Sequence[Sequence[int]]) -> str:
 def _object(
     matcher: Matcher, windows: Windows, members: list[str], bodies: list[tuple[str, list[str]]]
 ) -> Iterator[Stmt]:
-    """All tables as one object, with the lines of every window."""
+    """Yield all tables as one object, with the lines of every window."""
     lines = [[*window, *[matcher.lines] * (WORD - len(window))] for window in windows.lines]
     members = [f"{_least(matcher.lines)} order[{len(lines)}][{WORD}];", *members]
     yield Frame(("RCSC_CONST_SECTION static const struct {",), tuple(map(Line, members)))
@@ -203,12 +203,12 @@ def _object(
 
 
 def _rows(rows: Sequence[Sequence[int]]) -> list[str]:
-    """Rows of numbers, each in braces."""
+    """Spell rows of numbers, each in braces."""
     return [text for row in rows for text in ("{", *_dense(list(map(str, row))), "},")]
 
 
 def _dense(values: Sequence[str]) -> Iterator[str]:
-    """Values of an initialiser without blanks, as many in a line as it takes."""
+    """Yield values of an initialiser without blanks, as many in a line as fit."""
     taken: list[str] = []
     size = 0
     for value in values:
@@ -221,5 +221,5 @@ def _dense(values: Sequence[str]) -> Iterator[str]:
 
 
 def _least(most: int) -> str:
-    """The narrowest type that holds numbers up to this one."""
+    """Return the narrowest type that holds numbers up to this one."""
     return f"uint{next(bits for bits in (8, 16, 32) if most < 1 << bits)}_t"
