@@ -218,9 +218,7 @@ class RunningLevel:
     @property
     def line(self) -> str:
         """The line that the last cycle ran; empty for none."""
-        at = int(self.values[len(self.sign.leaves)])
-        lines = self.sign.tables.get(self.table, ())
-        return lines[at] if 0 <= at < len(lines) else ""
+        return self.sign.line_of(self.level, self.values)
 
     @property
     def fault(self) -> int:

@@ -287,6 +287,12 @@ class Signature:
                 return name
         return self._chosen(level, values)
 
+    def line_of(self, level: LevelSign, values: Values) -> str:
+        """The line that the cycle ran; empty for none."""
+        lines = self.tables.get(self.table_of(level, values), ())
+        at = int(values[len(self.leaves)])
+        return lines[at] if 0 <= at < len(lines) else ""
+
     def lines_before(self, level: LevelSign, values: Values) -> tuple[tuple[str, str], ...]:
         """Table and line of each that ran before that one in the cycle, in order."""
         if not self.begun(values):

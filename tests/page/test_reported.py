@@ -9,7 +9,6 @@ import pytest
 from rcsc.desk.studio.share.document import bundled, player
 from rcsc.front.commands import run as rcsc
 from rcsc.run.log.read import Log, read
-from rcsc.run.log.states import line_of
 from rcsc.views.pages.frame import hashed
 from tests.page.test_looks import LOOK
 from tests.studio.driven import HIGH, WIDE, Seat, dock
@@ -60,7 +59,7 @@ def test_every_tick_is_as_the_log_has_it(which: int, made: tuple[Path, Path, Log
         for level in log.levels:
             values = level.track.latest(now)
             assert values is not None
-            table, line = level.sign.table_of(level.level, values), line_of(level.sign, level.level, values)
+            table, line = level.sign.table_of(level.level, values), level.sign.line_of(level.level, values)
             said = seat.reads(f"#moment [aria-label='Level {level.name}']")
             assert f"table {table}, line {line}\n" in said
             assert f"▶ {line}\n" in f"{said}\n"

@@ -22,13 +22,12 @@ from rcsc.run.adopt import Begun
 from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.run.levels import Query
 from rcsc.run.log.export import coverage, csv_text, json_text
-from rcsc.run.log.queries import predicate
+from rcsc.run.log.queries import BadCondition, predicate
 from rcsc.run.log.read import Log, UnreadableLog, read
 from rcsc.run.log.recorder import CHUNK_MS, Recorder
 from rcsc.run.log.records import CHAIN, SEAL
 from rcsc.run.log.replay import Replay, find
 from rcsc.run.log.states import words
-from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, StateTableError, System, assemble
 from tests.support.programs.stages import emitted, program_of
@@ -631,13 +630,14 @@ def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
     last = run("replay", log, "--generated", tmp_path, "--at", 3, "--show", "lone").output
     assert f"  lone: {said}\n" in last
     assert f"the last: {said}" in run("log", log).output
-    assert find(read(log), predicate("lone.fault != none", read(log))) == 3
+    assert find(read(log), predicate("lone.fault != none", read(log).levels)) == 3
 
 
 def test_the_first_cycle_where_something_holds(log: Log) -> None:
     asked = {
         "task.workstation.inc_command == 2": 27,
         "task.workstation.inc_command = 2": 27,
+        "TASK.Workstation.inc-command = 2": 27,
         "task.workstation.inc_command=2 and task.workstation.input_command /= move": 27,
         "task.workstation.inc_command >= 2 and not task.workstation.inc_command > 2": 27,
         "1 < task.workstation.inc_command < 3": 27,
@@ -648,12 +648,12 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
         "primitive.from[0] < -1e9": None,
     }
     for text, tick in asked.items():
-        found = find(log, predicate(text, log))
+        found = find(log, predicate(text, log.levels))
         if text.startswith("primitive.from_robot"):
             assert found is not None
         else:
             assert found == tick, text
-    new = find(log, predicate("task.new_command", log), 10)
+    new = find(log, predicate("task.new_command", log.levels), 10)
     assert new is not None
     assert new >= 10
     track = log.level("task").track.latest(new)
@@ -673,7 +673,7 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
 )  # fmt: skip
 def test_a_question_that_cannot_be_asked(log: Log, text: str) -> None:
     with pytest.raises(BadCondition):
-        predicate(text, log)
+        predicate(text, log.levels)
 
 
 def test_the_exports_say_what_the_log_says(log: Log) -> None:

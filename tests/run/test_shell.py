@@ -476,6 +476,7 @@ def test_show_lines_levels_and_help(shell: Commands) -> None:
         "not not emove.idle = true",
         "not task.emove.resting and emove.resting = false",
         "task.table = pause_task",
+        "task.fault = none and task.assumptions_failed = ''",
         "gripper.primitive.opening_mm < .5",
         "task.cur_state = task.cur_state.next",
         "1 < tbuffer_boxt <= 10 < 30",

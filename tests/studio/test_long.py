@@ -14,7 +14,6 @@ from rcsc.desk.studio.runs.lines import MOST_RECORDS
 from rcsc.front.commands import run as rcsc
 from rcsc.run.log.export import csv_text
 from rcsc.run.log.read import Log, read
-from rcsc.run.log.states import line_of
 from tests.studio.driven import dock
 from tests.studio.served import Page, page, serving, until
 
@@ -60,7 +59,7 @@ def test_the_time_line_is_told_in_pieces_and_nothing_is_left_out(long: tuple[Pat
         for level in log.levels:
             wanted, last = [[0, "", "", ""]], ["", "", ""]
             for tick, values in list(level.track)[1:]:
-                now = [level.sign.table_of(level.level, values), line_of(level.sign, level.level, values), ""]
+                now = [level.sign.table_of(level.level, values), level.sign.line_of(level.level, values), ""]
                 if now != last:
                     wanted.append([tick, *now])
                     last = now

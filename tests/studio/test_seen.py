@@ -229,7 +229,7 @@ def test_curves_are_the_values_of_every_tick_with_gaps_where_nobody_set_one(tmp_
         ]
     ) in {0, 1}
     log = read(path)
-    known = {name: of for name, of in named_columns(log).items() if of[1].at >= 0}
+    known = {name: of for name, of in named_columns(log.levels).items() if of[1].at >= 0}
     rows = {tick: dict(zip(known, values, strict=True)) for tick, values in valued(log, known)}
     gaps = 0
 

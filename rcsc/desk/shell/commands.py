@@ -17,7 +17,7 @@ from rcsc.desk.shell.session import MOST_CYCLES, Session
 from rcsc.desk.shell.typed_names import NamedLine
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
-from rcsc.run.orders.conditions import NAME
+from rcsc.run.log.queries import NAME, known_name, normal
 from rcsc.run.orders.roles import COMMAND, served
 
 Output = list[str]
@@ -174,14 +174,14 @@ class Commands:
         if cycled is not None:
             return self._alone(cycled, _number(args[0]) if args else 1)
         level, rest = typed_names.split(name, self.session.levels, self.session.level)
-        if typed_names.known_name(rest, part_names(self.session.program(level))) is None:
+        if known_name(rest, part_names(self.session.program(level))) is None:
             raise self._unknown(name)
         return self.session.part(level, rest, args)
 
     def _cycled(self, name: str) -> RunningLevel | None:
         """The level that `task-level`, or `task`, cycles."""
-        wanted = typed_names.normal(name)
-        every = {typed_names.normal(level.name): level for level in self.session.levels}
+        wanted = normal(name)
+        every = {normal(level.name): level for level in self.session.levels}
         return every.get(wanted.removesuffix(_SUFFIX)) or every.get(wanted)
 
     def _unknown(self, name: str) -> Refused:

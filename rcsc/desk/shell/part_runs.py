@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.shell.typed_names import known_name, near
+from rcsc.desk.shell.typed_names import near
 from rcsc.lang.interpret import (
     UNDEFINED,
     ExternError,
@@ -40,6 +40,7 @@ from rcsc.lang.model import (
     value_of_text,
 )
 from rcsc.run.levels import RunningLevel
+from rcsc.run.log.queries import known_name
 from rcsc.run.signature import Values
 
 STEPS = ("preprocess", "state_table", "postprocess")

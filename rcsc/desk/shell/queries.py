@@ -1,19 +1,17 @@
-"""Questions to the running system: `task.cur_state = state_3 and primitive.travelled_mm > 40` (`rcsc.run.orders.conditions`).
+"""Questions to the running system: `task.cur_state = state_3 and primitive.travelled_mm > 40` (`rcsc.run.log.queries`).
 
-In: a text, and the levels as they are. Out: a `StateQuery` that can be asked after every cycle. A level's `table` and `line` are what it
-runs; names are known without their level, and whatever their case.
+In: a text, and the levels as they are. Out: a `StateQuery` that can be asked after every cycle. Names are known without their level, and
+whatever their case.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.shell.typed_names import by_name, known_name, one_leaf, shown, split
+from rcsc.desk.shell.typed_names import one_leaf, shown, split
 from rcsc.run.levels import RunningLevel
-from rcsc.run.orders.conditions import BadCondition, Operand, condition
-
-Running = Mapping[str, RunningLevel]
+from rcsc.run.log.queries import BadCondition, Column, Predicate, condition, named_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +25,10 @@ class StateQuery:
 
     text: str
     chosen: str
-    holds: Callable[[Running], bool]
+    holds: Predicate
     leaves: tuple[tuple[str, int], ...]
 
-    def now(self, running: Running) -> str:
+    def now(self, running: Mapping[str, RunningLevel]) -> str:
         """Return what it reads, as it is now."""
         return ", ".join(shown(running[level], at) for level, at in dict.fromkeys(self.leaves))
 
@@ -41,58 +39,32 @@ def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) ->
     Raises:
         Refused: It is no question, or names what is not there.
     """
-    names = _Names(levels, chosen)
-    try:
-        holds = condition(text, names)
-    except BadCondition as bad:
-        raise Refused(Code.SHELL_VALUE if bad.value else Code.SHELL_COMMAND, str(bad), *bad.helps) from bad
-    return StateQuery(text.strip(), chosen.name, holds, tuple(names.leaves))
+    known = named_columns(levels)
+    leaves: list[tuple[str, int]] = []
 
-
-@dataclass(slots=True)
-class _Names:
-    """The leaves of the levels, and what each runs."""
-
-    levels: Sequence[RunningLevel]
-    chosen: RunningLevel
-    leaves: list[tuple[str, int]] = field(default_factory=list)
-
-    def operand(self, name: str) -> Operand[Running] | None:
-        """A leaf, or the table or line that a level runs."""
+    def column(name: str) -> Column | None:
         try:
-            level, at = one_leaf(name, self.levels, self.chosen)
+            level, at = one_leaf(name, levels, chosen)
         except Refused:
-            return self._runs(name)
-        of, leaf = level.name, level.sign.leaves[at]
-        self.leaves.append((of, at))
-        if leaf.members:
-            return Operand(name, "member", lambda now: leaf.shown(now[of].values[at]), leaf.members)
-        kind = "bool" if leaf.c_type == "bool" else "number"
-        return Operand(name, kind, lambda now: now[of].values[at])
+            level, word = split(name, levels, chosen)
+            return known.get(f"{level.name}.{word}")
+        leaves.append((level.name, at))
+        return known[f"{level.name}.{level.sign.leaves[at].name}"]
 
-    def _runs(self, name: str) -> Operand[Running] | None:
-        level, rest = split(name, self.levels, self.chosen)
-        of = level.name
-        if rest == "table":
-            return Operand(name, "member", lambda now: now[of].table, tuple(level.sign.tables))
-        if rest == "line":
-            lines = dict.fromkeys(line for table in level.sign.tables.values() for line in table)
-            return Operand(name, "member", lambda now: now[of].line, tuple(lines))
-        return None
-
-    def member(self, word: str, members: tuple[str, ...]) -> str | None:
-        """The member, whatever its case and hyphens."""
-        return known_name(word, members)
-
-    def unknown(self, name: str) -> Exception:
-        """As an unknown variable is refused."""
+    def unknown(name: str) -> Exception:
         try:
-            one_leaf(name, self.levels, self.chosen)
+            one_leaf(name, levels, chosen)
         except Refused as error:
             return error
         return BadCondition(f"`{name}` is no variable")
 
+    try:
+        holds = condition(text, column, unknown)
+    except BadCondition as bad:
+        raise Refused(Code.SHELL_VALUE if bad.value else Code.SHELL_COMMAND, str(bad), *bad.helps) from bad
+    return StateQuery(text.strip(), chosen.name, holds, tuple(leaves))
+
 
 def asked(query: StateQuery, levels: Sequence[RunningLevel]) -> bool:
     """Whether it holds now."""
-    return query.holds(by_name(levels))
+    return query.holds({level.name: level.values for level in levels})

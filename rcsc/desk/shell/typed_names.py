@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.run.levels import RunningLevel
+from rcsc.run.log.queries import known_name, normal
 from rcsc.run.signature import Leaf, Signature, Value, number_word
 
 
@@ -27,17 +28,6 @@ class NamedLine:
 
     def __str__(self) -> str:
         return f"{self.level}.{self.table}.{self.line}"
-
-
-def normal(name: str) -> str:
-    """The spelling by which names are compared."""
-    return name.casefold().replace("-", "_")
-
-
-def known_name(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that is meant: the exact one, or else the first equal but for case and hyphens."""
-    every = list(known)
-    return name if name in every else next((word for word in every if normal(word) == normal(name)), None)
 
 
 def near(name: str, known: Iterable[str]) -> tuple[str, ...]:

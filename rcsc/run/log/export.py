@@ -17,7 +17,7 @@ from rcsc.base.host.files import written_whole
 from rcsc.run.adopt import Begun
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import LogColumn, columns, line_of, plain
+from rcsc.run.log.states import LogColumn, columns, plain
 from rcsc.run.signature import Value, Values
 from rcsc.run.unset.since import LevelSeen, Unsets
 
@@ -48,7 +48,7 @@ def _coverage(level: LoggedLevel) -> Iterator[Coverage]:
     cycles = iter(level.track)
     next(cycles)  # the state that recording started from
     for _, values in cycles:
-        counts[level.sign.table_of(level.level, values), line_of(level.sign, level.level, values)] += 1
+        counts[level.sign.table_of(level.level, values), level.sign.line_of(level.level, values)] += 1
         counts.update(level.sign.lines_before(level.level, values))
     for table in level.level.every_table:
         lines = level.sign.tables.get(table, ())
@@ -123,7 +123,7 @@ def valued(log: Log, known: Known) -> Iterator[tuple[int, list[Value | str | Non
 
 def csv_text(log: Log) -> str:
     """A heading, then a row a tick; enumerations in the table's words."""
-    known = named_columns(log)
+    known = named_columns(log.levels)
     cells = (
         [tick, tick * log.tick_ms, *("" if value is None else _cell(value) for value in values)]
         for tick, values in valued(log, known)
@@ -197,7 +197,7 @@ def write_parquet(log: Log, path: Path) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    known = named_columns(log)
+    known = named_columns(log.levels)
     cells: dict[str, list[Value | str | None]] = {name: [] for name in known}
     ticks = []
     for tick, values in valued(log, known):

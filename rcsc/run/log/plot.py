@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING
 
 from rcsc.base.host.files import written_whole
 from rcsc.run.log.export import valued
-from rcsc.run.log.queries import named_columns, nearest
+from rcsc.run.log.queries import BadCondition, named_columns, nearest
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
-from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Value
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ def _draw(axes: "Axes", log: Log, series: _Series, over: _Series | None) -> None
 
 
 def _series(log: Log, names: Sequence[str]) -> list[_Series]:
-    known = named_columns(log)
+    known = named_columns(log.levels)
     for name in names:
         if name not in known:
             raise BadCondition(nearest(name, known))

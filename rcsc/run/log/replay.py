@@ -20,7 +20,7 @@ from rcsc.run.levels import cycled, put_checked
 from rcsc.run.log.queries import Predicate
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.schema import fingerprints
-from rcsc.run.log.states import line_of, words
+from rcsc.run.log.states import words
 from rcsc.run.signature import Leaf, LevelSign, Signature, Value, Values
 from rcsc.run.system import Kind, executors, signatures
 
@@ -195,7 +195,7 @@ def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
 
 
 def _line(sign: Signature, level: LevelSign, values: Values) -> str:
-    last = sign.table_of(level, values), line_of(sign, level, values) or "none"
+    last = sign.table_of(level, values), sign.line_of(level, values) or "none"
     return ", ".join(f"{table} line {line}" for table, line in (*sign.lines_before(level, values), last))
 
 

@@ -15,34 +15,17 @@ TRACED = ("table", "line", "fault", "fault_at", "assumptions_failed")
 """What a cycle leaves beside the leaves; a leaf of the same name hides it."""
 
 
-def line_of(sign: Signature, level: LevelSign, values: Values) -> str:
-    """The line that the cycle ran; empty for none."""
-    lines = sign.tables.get(sign.table_of(level, values), ())
-    at = int(values[len(sign.leaves)])
-    return lines[at] if 0 <= at < len(lines) else ""
-
-
 def fault_of(sign: Signature, values: Values) -> str:
     """What stopped the cycle; `none` for nothing."""
     at = int(values[len(sign.leaves) + 1])
     return FAULTS[at] if 0 <= at < len(FAULTS) else f"{at}?"
 
 
-def refused_of(sign: Signature, values: Values) -> str:
-    """The leaf that was refused, or the assumption that ended the cycle; empty for none."""
-    return sign.fault_at(values)
-
-
-def failed_of(sign: Signature, values: Values) -> str:
-    """The assumptions that did not hold, by spaces."""
-    return " ".join(sign.failures(values))
-
-
 def traced(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
     """Return the trace in words, by name."""
     texts = (
-        sign.table_of(level, values), line_of(sign, level, values), fault_of(sign, values),
-        refused_of(sign, values), failed_of(sign, values),
+        sign.table_of(level, values), sign.line_of(level, values), fault_of(sign, values),
+        sign.fault_at(values), " ".join(sign.failures(values)),
     )  # fmt: skip
     return dict(zip(TRACED, texts, strict=True))
 
@@ -57,7 +40,7 @@ def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
     """`table acquire: no line matches`, `table acquire: input refused, `status_in``; empty where the cycle ended well."""
     if int(values[len(sign.leaves) + 1]) == 0:
         return ""
-    leaf = refused_of(sign, values)
+    leaf = sign.fault_at(values)
     return f"table {sign.table_of(level, values)}: {fault_of(sign, values)}" + (f", `{leaf}`" if leaf else "")
 
 
@@ -120,8 +103,8 @@ def _trace(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
     lines = tuple(dict.fromkeys(line for table in tables for line in sign.tables.get(table, ())))
     return (
         LogColumn("table", tables, "", "", lambda values: sign.table_of(level, values)),
-        LogColumn("line", ("", *lines), "", "", lambda values: line_of(sign, level, values)),
+        LogColumn("line", ("", *lines), "", "", lambda values: sign.line_of(level, values)),
         LogColumn("fault", FAULTS, "", "", lambda values: fault_of(sign, values)),
-        LogColumn("fault_at", (), "", "", lambda values: refused_of(sign, values)),
-        LogColumn("assumptions_failed", (), "", "", lambda values: failed_of(sign, values)),
+        LogColumn("fault_at", (), "", "", sign.fault_at),
+        LogColumn("assumptions_failed", (), "", "", lambda values: " ".join(sign.failures(values))),
     )

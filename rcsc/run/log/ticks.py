@@ -12,7 +12,7 @@ from rcsc.lang.model import pending
 from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import failed_of, fault_of, line_of, refused_of
+from rcsc.run.log.states import fault_of
 from rcsc.run.signature import Leaf, Signature, Values
 
 NUMBER, COMMAND = "inc_command", "input_command"
@@ -193,8 +193,8 @@ class _Cycle:
     def box(self, told: LoggedCycle | None) -> LevelTick:
         """Return what it shows."""
         sign, level = self.logged.sign, self.logged.level
-        fault, leaf = fault_of(sign, self.after), refused_of(sign, self.after)
-        line, failed = line_of(sign, level, self.after), failed_of(sign, self.after)
+        fault, leaf = fault_of(sign, self.after), sign.fault_at(self.after)
+        line, failed = sign.line_of(level, self.after), " ".join(sign.failures(self.after))
         lines = told.matched if told is not None and told.matched else (line,) if line else ()
         above, below = self._exchanges()
         return LevelTick(

@@ -14,5 +14,5 @@ Source: Haynes et al. 1984, section 9.
 
 Modules, in the order the data flows: `roles` (which buffer carries orders, and which of its fields says what), `numbered`
 (an order and its answer), `script` (rows), `operator` (who gives them), `stopped` (a run kept, and gone on with by another
-process), `together` (operator and plants as one), `conditions` (on levels, as people type them).
+process), `together` (operator and plants as one).
 """

@@ -122,8 +122,8 @@ def _values(fields: tuple[TickValue, ...]) -> str:
 
 
 def drawn_first(log: Log, displays: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the variables that have a curve at first: numbers of the displays, else the first in buffers from or to the outside."""
-    known = {name for name, (_, column) in named_columns(log).items() if _is_number(column)}
+    """Which variables have a curve at first: the numbers of the displays, else the first that buffers from outside or to there carry."""
+    known = {name for name, (_, column) in named_columns(log.levels).items() if _is_number(column)}
     shown = [name for names in displays.values() for name in names if name in known]
     return list(dict.fromkeys(shown or list(_outside(log, known))[:MOST_SERIES]))
 

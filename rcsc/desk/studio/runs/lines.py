@@ -8,7 +8,7 @@ from typing import Any
 
 from rcsc.desk.studio.runs.history import History
 from rcsc.run.log.read import LoggedLevel
-from rcsc.run.log.states import fault_of, line_of
+from rcsc.run.log.states import fault_of
 from rcsc.run.signature import Signature, Values
 
 MOST_CHANGES = 20_000
@@ -93,6 +93,6 @@ def _stand(logged: LoggedLevel, values: Values) -> Stand:
     fault = fault_of(logged.sign, values)
     return (
         logged.sign.table_of(logged.level, values),
-        line_of(logged.sign, logged.level, values),
+        logged.sign.line_of(logged.level, values),
         "" if fault == "none" else logged.sign.fault_text(values),
     )

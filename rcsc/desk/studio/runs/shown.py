@@ -8,7 +8,6 @@ from typing import Any
 
 from rcsc.desk.studio.runs.history import History
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import line_of
 from rcsc.run.log.ticks import LevelTick, Reported, level_tick, other_ends
 from rcsc.run.signature import Signature, Values
 
@@ -60,7 +59,7 @@ def _said(box: LevelTick, logged: LoggedLevel, tick: int) -> dict[str, Any]:
     values = logged.track.latest(tick) or ()
     said: dict[str, Any] = _plain(box)
     if not box.ran:
-        line = line_of(logged.sign, logged.level, values)
+        line = logged.sign.line_of(logged.level, values)
         said |= {"table": logged.sign.table_of(logged.level, values), "lines": [line] if line else []}
     said["above"] = [{"order": order, "report": report} for order, report in said["above"]]
     said["below"] = [{"report": report, "order": order} for report, order in said["below"]]

@@ -20,9 +20,8 @@ from rcsc.desk.studio.runs.shown import Shown
 from rcsc.desk.studio.runs.why import why
 from rcsc.lang.model import Program
 from rcsc.run.description import BadDescription, description
-from rcsc.run.log.queries import predicate
+from rcsc.run.log.queries import BadCondition, predicate
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.orders.conditions import BadCondition
 from rcsc.run.signature import Signature, number_word
 
 MOST_MARKED = 1000
@@ -239,7 +238,7 @@ class TimeLine:
             log = history.ran_at(at)
             if id(log) not in asked:
                 try:
-                    asked[id(log)] = predicate(text, log)
+                    asked[id(log)] = predicate(text, log.levels)
                 except BadCondition as error:
                     raise Refused(Code.STUDIO, str(error), *error.helps) from error
             if count % _BREATH == 0:

@@ -15,8 +15,8 @@ from rcsc.front.commands.shared.show import Output, show
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import NotBuilt
 from rcsc.run.levels import BadState
+from rcsc.run.log.queries import BadCondition
 from rcsc.run.log.read import UnreadableLog
-from rcsc.run.orders.conditions import BadCondition
 
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE")
 SHOWN = 12

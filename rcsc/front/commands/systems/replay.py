@@ -102,7 +102,7 @@ def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:
     """The tick that is asked for; None for all, 0 for one that there is not."""
     if at is not None and at not in log.ticks:
         raise click.BadParameter(f"the log holds cycles {log.first + 1} to {log.last}", param_hint="--at")
-    return at if find_ is None else find(log, predicate(find_, log), at) or 0
+    return at if find_ is None else find(log, predicate(find_, log.levels), at) or 0
 
 
 def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None:
