@@ -6,7 +6,7 @@ stands so in the text. Equality of `rcsc.lang.model` leaves places out, so that 
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Proposal
 from rcsc.driver.proofs import moved
@@ -18,35 +18,22 @@ from rcsc.proof.table.verdict import TableVerdict
 
 T = TypeVar("T")
 
-MOST_PROPOSALS = 200
-"""Proposals of which it is kept what came of them."""
 MOST_RESTS, MOST_EACH = 8, 8
-"""Rests of programs that are kept, and versions of a table in each: of the last minutes of typing."""
+"""Rests of programs that are kept, and versions of what is known of a table in each: of the last minutes of typing."""
+MOST_PROPOSALS = 200
+"""Proposals of a table of which it is kept what came of them."""
 
 
 class OutdatedError(Exception):
     """The text has changed meanwhile: nobody waits for the answer any more."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Told:
-    """The diagnostics of a verdict, and where the parts of its table stood, seen from its name."""
-
-    verdict: TableVerdict
-    unproved: frozenset[str]
-    shape: tuple[object, ...]
-    diagnostics: tuple[Diagnostic, ...]
-    start: int
-
-
 @dataclass(slots=True)
 class _Versions:
-    """What is known of the tables of one rest of a program, by name, the last version first."""
+    """What is known in one rest of a program: by kind and table what was asked and what came of it, the last first."""
 
     rest: Program
-    verdicts: dict[str, list[TableVerdict]] = field(default_factory=dict)
-    told: dict[str, list[_Told]] = field(default_factory=dict)
-    outcomes: dict[Proposal, list[tuple[Table, Outcome]]] = field(default_factory=dict)
+    known: dict[tuple[str, str], list[tuple[object, object]]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -73,18 +60,13 @@ class Memo:
         Raises:
             OutdatedError: Nobody waits for it.
         """
-        self.asked()
-        kept = self._of(program).verdicts.setdefault(str(table.name), [])
-        for known in kept:
-            if known.table == table:
-                return replace(known, table=table)
-        before = smt.unanswered()
-        verdict = make()
-        self.asked()
-        self.made += 1
-        if self.keeps_all or smt.unanswered() == before:
-            _keep(kept, verdict)
-        return verdict
+
+        def made() -> TableVerdict:
+            self.made += 1
+            return make()
+
+        known = self._known(self._of(program), ("verdict", str(table.name)), table, made)
+        return replace(known, table=table)
 
     def told(
         self, verdict: TableVerdict, unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
@@ -94,19 +76,15 @@ class Memo:
         Raises:
             OutdatedError: Nobody waits for them.
         """
-        self.asked()
-        span, shape = verdict.table.span, _shape(verdict.table)
+        span = verdict.table.span
         assert self._program is not None  # its verdict was asked for
-        kept = self._of(self._program).told.setdefault(str(verdict.table.name), [])
-        for known in kept:
-            if (known.shape, known.unproved) == (shape, unproved) and known.verdict == verdict:
-                return [moved(each, span.start - known.start, span.file) for each in known.diagnostics]
-        before = smt.unanswered()
-        diagnostics = make()
-        self.asked()
-        if self.keeps_all or smt.unanswered() == before:
-            _keep(kept, _Told(verdict, unproved, shape, tuple(diagnostics), span.start))
-        return diagnostics
+        start, diagnostics = self._known(
+            self._of(self._program),
+            ("told", str(verdict.table.name)),
+            (_shape(verdict.table), unproved, verdict),
+            lambda: (span.start, tuple(make())),
+        )
+        return [moved(each, span.start - start, span.file) for each in diagnostics]
 
     def outcome(
         self, program: Program, table: Table, proposal: Proposal, make: Callable[[], Outcome]
@@ -116,22 +94,26 @@ class Memo:
         Raises:
             OutdatedError: Nobody waits for it.
         """
-        self.asked()
-        known = self._of(program).outcomes
-        kept = known.setdefault(proposal, [])
-        for before, outcome in kept:
-            if before == table:
-                return outcome
-        outcome = make()
-        self.asked()
-        _keep(kept, (table, outcome))
-        while len(known) > MOST_PROPOSALS:
-            del known[next(iter(known))]
-        return outcome
+        kind = "outcome", str(table.name)
+        return self._known(self._of(program), kind, (proposal, table), make, MOST_PROPOSALS, keeps_all=True)
 
-    def forget(self) -> None:
-        """Forget every verdict."""
-        self._versions, self._program, self.answers = [], None, Answers()
+    def _known(
+        self, versions: _Versions, kind: tuple[str, str], asked: object, make: Callable[[], T], most: int = MOST_EACH,
+        *, keeps_all: bool = False,
+    ) -> T:  # fmt: skip
+        """What came of an equal question, else what comes of it now: kept first, while the oldest is dropped."""
+        self.asked()
+        kept = versions.known.setdefault(kind, [])
+        for before, result in kept:
+            if before == asked:
+                return cast("T", result)
+        open_before = smt.unanswered()
+        made = make()
+        self.asked()
+        if keeps_all or self.keeps_all or smt.unanswered() == open_before:
+            kept.insert(0, (asked, made))
+            del kept[most:]
+        return made
 
     def asked(self) -> None:
         """Go on only if somebody waits; what was proved since nobody did may be of questions left open, and is not kept.
@@ -151,12 +133,6 @@ class Memo:
         self._versions = [found, *(known for known in self._versions if known is not found)][:MOST_RESTS]
         self._program = program
         return found
-
-
-def _keep(kept: list[T], new: T) -> None:
-    """Put first what is new, and drop what was not asked for longest."""
-    kept.insert(0, new)
-    del kept[MOST_EACH:]
 
 
 def _shape(table: Table) -> tuple[object, ...]:
