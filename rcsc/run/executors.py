@@ -130,9 +130,6 @@ def build(generated: Path, signs: Sequence[Signature]) -> Library:
     Raises:
         NotBuilt: There is no compiler, or it refused.
     """
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        raise NotBuilt("there is no C compiler here")
     layout = "\n".join(_layout(sign) for sign in signs)
     try:
         texts = [content(path) for sign in signs for path in _files(generated, sign)[:2]]
@@ -143,8 +140,22 @@ def build(generated: Path, signs: Sequence[Signature]) -> Library:
         raise NotBuilt(f"a generated file {error}") from error
     key = hashlib.sha256(b"\0".join([layout.encode(), *texts])).digest()
     if key not in _BUILT:
-        _BUILT[key] = _built(compiler, generated, signs, layout)
+        _BUILT[key] = _built(generated, signs, layout)
     return _BUILT[key]
+
+
+def compiled(library: Path, *args: str) -> None:
+    """Make a library of C.
+
+    Raises:
+        NotBuilt: There is no compiler, or it refused.
+    """
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        raise NotBuilt("there is no C compiler here")
+    ran = children.run([compiler, *FLAGS, "-o", str(library), *args])
+    if ran.status != 0:
+        raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
 
 
 def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
@@ -159,16 +170,13 @@ def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
         raise NotBuilt(str(error)) from error
 
 
-def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: str) -> Library:
+def _built(generated: Path, signs: Sequence[Signature], layout: str) -> Library:
     with children.scratch("executors") as folder:
         shim = folder / "layout.c"
         shim.write_text(layout, encoding="utf-8")
         library = folder / "executors.so"
         sources = [str(_files(generated, sign)[0]) for sign in signs]
-        command = [compiler, *FLAGS, f"-iquote{generated / 'c'}", "-o", str(library), str(shim), *sources]
-        ran = children.run(command)
-        if ran.status != 0:
-            raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
+        compiled(library, f"-iquote{generated / 'c'}", str(shim), *sources)
         return _loaded(library)
 
 

@@ -18,7 +18,7 @@ import pytest
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.guard import MOST_CONNECTIONS, door
 from rcsc.desk.shell.reload.refusal import Refused as Refusal
-from rcsc.desk.studio.hub import MOST_OPEN, Ask, Client, Hub, message
+from rcsc.desk.studio.hub import MOST_OPEN, Ask, Client, Concern, Hub, message
 from rcsc.desk.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
 from rcsc.front.commands import run as rcsc
 from tests.studio.driven import DOCK, Seat
@@ -26,7 +26,7 @@ from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, servin
 from tests.support.strangers import STRANGERS, held_beside
 
 
-class Echo:
+class Echo(Concern):
     """A concern of the tests' own."""
 
     name, lane = "echo", "echo"

@@ -21,7 +21,7 @@ from rcsc.base.host.children import run as run_program
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.reload.composed import prove_levels
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import LATER, TOLD_S, Ask, CancelledError, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, TOLD_S, Ask, CancelledError, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.live import LANE as RUN
 from rcsc.desk.studio.runs.live import Live
 from rcsc.driver.compile import compile_system
@@ -37,7 +37,7 @@ MOST_TEXT = 200_000
 T = TypeVar("T")
 
 
-class Build:
+class Build(Concern):
     """Compiles the system's tables when the studio begins and whenever a page asks; proves the levels together."""
 
     name, lane = "build", LANE

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 from rcsc.base.diagnostics.coded import CodedError
 from rcsc.base.diagnostics.codes import Code
@@ -152,35 +152,31 @@ Raises:
 """
 
 
-class Concern(Protocol):
-    """What answers questions of some kinds."""
+class Concern:
+    """What answers questions of some kinds.
 
-    @property
-    def name(self) -> str:
-        """The first part of its kinds."""
-        ...
+    Attributes:
+        name: The first part of its kinds.
+        lane: The thread in which its handlers run.
+    """
 
-    @property
-    def lane(self) -> str:
-        """The thread in which its handlers run."""
-        ...
+    name: str
+    lane: str
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
         """By kind, `NAME.VERB`."""
-        ...
+        raise NotImplementedError
 
     def greeting(self) -> Json:
         """What a page is told of it as it opens; called in its lane."""
-        ...
+        return {}
 
     def begin(self) -> None:
         """Do what is to be done before any page asks; called in its lane once the studio is served."""
-        ...
 
     def close(self) -> None:
         """Let go of what it holds; called when the studio ends."""
-        ...
 
 
 class Lane:

@@ -11,7 +11,7 @@ from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import LATER, Ask, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
@@ -68,7 +68,7 @@ class _Traced:
         return told
 
 
-class Plots:
+class Plots(Concern):
     """Answers with curves; in the lane of the run."""
 
     name, lane = "plot", LANE
@@ -85,26 +85,13 @@ class Plots:
         """By kind."""
         return {"plot.names": self._names, "plot.curves": self._curves}
 
-    def greeting(self) -> Json:
-        """Nothing that a page must know at once."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing."""
-
     def close(self) -> None:
         """Let go of what was found."""
         self._known, self._finding = {}, iter(())
 
-    def _history(self) -> History:
-        history = self._time.source.history
-        if not history.logs:
-            raise Refused(Code.STUDIO, f"no run is there: {self._time.live.why}")
-        return history
-
     def _names(self, _: Ask) -> Json:
         """Every variable by its whole name, and those that the system's description shows, by set."""
-        log = self._history().logs[-1]
+        log = self._time.history().logs[-1]
         names = [
             {"name": f"{logged.name}.{leaf.name}", "unit": leaf.unit, "kind": leaf.kind}
             for logged in log.levels
@@ -127,7 +114,7 @@ class Plots:
         names = ask.body.members("names")
         if len(names) > MOST_NAMES:
             raise Refused(Code.STUDIO, f"more than {MOST_NAMES} curves")
-        history = self._history()
+        history = self._time.history()
         if (history, history.era) != self._of:
             self._known, self._finding, self._of = {}, history.find_gaps(), (history, history.era)
         wanted = [self._traced(history, name) for name in names]

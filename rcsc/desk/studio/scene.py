@@ -13,8 +13,7 @@ from typing import Any, Protocol
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import Session
-from rcsc.desk.studio.hub import Ask, Handler, Json
-from rcsc.desk.studio.runs.history import History
+from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
 from rcsc.run.levels import RunningLevel, StateTableError
@@ -65,7 +64,7 @@ class Poses:
         return self.packed[place] if place >= 0 else None
 
 
-class Cell:
+class Cell(Concern):
     """Answers how it looks outside the levels; in the lane of the run."""
 
     name, lane = "cell", LANE
@@ -94,12 +93,6 @@ class Cell:
             "why": "" if self._space else self._why,
             "drawn": self._drawer is not None or self._pictured,
         }
-
-    def begin(self) -> None:
-        """Nothing: poses are kept from when a system is opened."""
-
-    def close(self) -> None:
-        """Nothing is held that needs it."""
 
     # --- the run ---
 
@@ -150,7 +143,7 @@ class Cell:
         }
 
     def _drawn(self, ask: Ask) -> Json:
-        history = self._history()
+        history = self._time.history()
         tick = ask.body.whole("tick", history.first, history.last)
         return {"tick": tick, **self.drawing(tick, projected=ask.body.flag("projected"))}
 
@@ -160,17 +153,11 @@ class Cell:
         Raises:
             CodedError, Refused: It cannot be drawn, with the reason.
         """
-        history = self._history()
+        history = self._time.history()
         if self._drawer is None:
             return {"svg": self._picture(tick), "caption": []}
         drawing = self._drawer(history.stood_at(tick), tick, projected=projected)
         return {"svg": drawing.svg, "caption": list(drawing.caption)}
-
-    def _history(self) -> History:
-        history = self._time.source.history
-        if not history.logs:
-            raise Refused(Code.STUDIO, f"no run is there: {self._time.live.why}")
-        return history
 
     def _picture(self, tick: int) -> str:
         """The plant's own picture, which is of now alone."""

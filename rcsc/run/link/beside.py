@@ -6,7 +6,6 @@ The C is built into a library; where each leaf lies in the system's struct the c
 
 import ctypes
 import re
-import shutil
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,7 @@ from pathlib import Path
 
 from rcsc.base.host import children
 from rcsc.run.description import Description
-from rcsc.run.executors import FLAGS, NotBuilt
+from rcsc.run.executors import compiled
 from rcsc.run.levels import BadState, StateTableError
 from rcsc.run.link.drawn_script import Begin, Published, Tick
 from rcsc.run.link.wiring import Linked
@@ -234,9 +233,6 @@ def _built(
     Raises:
         NotBuilt: There is no compiler, or it refused.
     """
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        raise NotBuilt("there is no C compiler here")
     struct_name = f"{system.word}_t"
     places = ", ".join(
         f"offsetof({struct_name}, {member})" for leaves in members.values() for member, _ in leaves
@@ -250,9 +246,5 @@ def _built(
         for word in (system.word, *(program.names.program for program in system.programs))
     ]
     library = folder / "system.so"
-    ran = children.run(
-        [compiler, *FLAGS, f"-I{sources}", "-o", str(library), str(folder / "places.c"), *files]
-    )
-    if ran.status != 0:
-        raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
+    compiled(library, f"-I{sources}", str(folder / "places.c"), *files)
     return ctypes.CDLL(str(library))

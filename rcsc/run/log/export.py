@@ -17,6 +17,7 @@ from rcsc.base.host.files import written_whole
 from rcsc.run.adopt import Begun
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.schema import ROS
 from rcsc.run.log.states import LogColumn, columns, plain
 from rcsc.run.signature import Value, Values
 from rcsc.run.unset.since import LevelSeen, Unsets
@@ -207,13 +208,7 @@ def write_parquet(log: Log, path: Path) -> None:
     arrays = {"tick": pa.array(ticks, pa.int64())}
     arrays["time_ms"] = pa.array([tick * log.tick_ms for tick in ticks], pa.int64())
     for name, (_, column) in known.items():
-        array = pa.array(cells[name], getattr(pa, _ARROW.get(column.c_type, "string"))())
+        array = pa.array(cells[name], pa.type_for_alias(ROS.get(column.c_type, "string")))
         arrays[name] = array if column.c_type else array.dictionary_encode()
     with written_whole(path) as beside:
         parquet.write_table(pa.table(arrays), beside)
-
-
-_ARROW = {
-    "bool": "bool_", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
-    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64", "float": "float32",
-}  # fmt: skip

@@ -26,10 +26,11 @@ SIGNATURE = "rcsc.signature"
 LEVELS, BUFFERS, RESTARTS = "/levels/", "/buffers/", "/restarts/"
 """How the topics of channels begin."""
 
-_ROS = {
+ROS = {
     "bool": "bool", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
     "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64", "float": "float32",
 }  # fmt: skip
+"""Types of leaves as messages name them."""
 _TRACE_FIELDS = (
     "int32 line # place of the line in its table, from 0; -1 for none",
     "int32 fault # 0 for none",
@@ -52,7 +53,7 @@ def message_definition(leaves: Sequence[Leaf], failed: Sequence[str] | None = No
 
 
 def _field(leaf: Leaf) -> Iterable[str]:
-    kind, name = _ROS[leaf.c_type], leaf.attribute
+    kind, name = ROS[leaf.c_type], leaf.attribute
     for value, member in enumerate(leaf.members):
         yield f"{kind} {name.upper()}_{member.upper()}={value}"
     comment = " ".join(f"{leaf.name} ({leaf.kind}{', ' + leaf.unit if leaf.unit else ''}) {leaf.doc}".split())

@@ -17,10 +17,11 @@ from rcsc.desk.shell.commands import Commands, Output, RunOrder
 from rcsc.desk.shell.opening import Opening, opened
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import Session
-from rcsc.desk.studio.hub import LATER, PROVER, Ask, Handler, Json
+from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
+from rcsc.run.log.read import LoggedLevel
 from rcsc.run.orders.operator import Operator
 from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.orders.together import Together
@@ -96,7 +97,7 @@ class Mark:
     changes: int = 0
 
 
-class Live:
+class Live(Concern):
     """The running system of a studio; all but `__init__` is called in the lane `run`.
 
     Attributes:
@@ -153,9 +154,6 @@ class Live:
         if self.commands is not None:
             self._tell("run.orders", self._orders())
         return self.state()
-
-    def begin(self) -> None:
-        """Nothing: it is opened once its tables are compiled."""
 
     def close(self) -> None:
         """Stop running."""
@@ -454,16 +452,20 @@ def _shown(lines: Output, refused: Refused | None) -> Json:
     return {"shown": lines}
 
 
-def _level(level: RunningLevel) -> dict[str, Any]:
+def level_shown(level: RunningLevel | LoggedLevel) -> dict[str, Any]:
+    """What a page is told of a level, whatever it runs."""
     tables = {table: list(level.sign.tables.get(table, ())) for table in level.level.every_table}
     return {
         "name": level.name,
         "period_ms": level.level.period_ms,
         "tables": tables,
         "program": level.sign.program,
-        "now": [list(line) for line in level.lines],
-        "fault": level.sign.fault_text(level.values) if level.fault else "",
     }
+
+
+def _level(level: RunningLevel) -> dict[str, Any]:
+    fault = level.sign.fault_text(level.values) if level.fault else ""
+    return {**level_shown(level), "now": [list(line) for line in level.lines], "fault": fault}
 
 
 def _field(to: Served, at: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import Ask, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.kept import KeptFinding, finding_in, glance
 from rcsc.run.log.read import Log, UnreadableLog, read
 
@@ -23,7 +23,7 @@ MOST_LOOKED_AT = 20_000
 _ASIDE = {".git", ".venv", "venv", "node_modules", "__pycache__"}
 
 
-class Logs:
+class Logs(Concern):
     """The logs that may be opened."""
 
     name, lane = "log", LANE
@@ -41,13 +41,6 @@ class Logs:
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
         return {"log.list": self._list, "log.open": self._open}
-
-    def greeting(self) -> Json:
-        """Nothing that a page must know at once."""
-        return {}
-
-    def close(self) -> None:
-        """Nothing is held."""
 
     def begin(self) -> None:
         """Show the first log that the user named, if any."""

@@ -11,11 +11,11 @@ from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import PROVER, Ask, Handler, Json
+from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.kept import KeptFinding
 from rcsc.desk.studio.runs.lines import Lines
-from rcsc.desk.studio.runs.live import LANE, Live, range_of
+from rcsc.desk.studio.runs.live import LANE, Live, level_shown, range_of
 from rcsc.desk.studio.runs.shown import Shown
 from rcsc.desk.studio.runs.why import why
 from rcsc.lang.model import Program
@@ -47,7 +47,7 @@ class Source:
     finding: KeptFinding | None = None
 
 
-class TimeLine:
+class TimeLine(Concern):
     """Answers about the ticks of the run that everybody looks at; in the lane of the run."""
 
     name, lane = "time", LANE
@@ -69,9 +69,6 @@ class TimeLine:
     def greeting(self) -> Json:
         """Which run it is."""
         return self.state()
-
-    def begin(self) -> None:
-        """Nothing."""
 
     def close(self) -> None:
         """Let the log go."""
@@ -95,7 +92,7 @@ class TimeLine:
             "first": log.first,
             "last": log.last,
             "tick_ms": log.tick_ms,
-            "levels": [_named(level) for level in log.levels],
+            "levels": [level_shown(level) for level in log.levels],
             "text": log.checked.text,
             "other": self._other(log),
             "finding": None if finding is None else finding.shown(),
@@ -120,29 +117,34 @@ class TimeLine:
 
     # --- ticks ---
 
-    def _history(self) -> History:
+    def history(self) -> History:
+        """The ticks of the run that everybody looks at.
+
+        Raises:
+            Refused: There is none.
+        """
         history = self.source.history
         if not history.logs:
             raise Refused(Code.STUDIO, f"no run is there: {self.live.why}")
         return history
 
     def _tick(self, ask: Ask) -> int:
-        history = self._history()
+        history = self.history()
         return ask.body.whole("tick", history.first, history.last)
 
     def _level(self, ask: Ask, tick: int) -> LoggedLevel:
         name = ask.body.text("level")
         try:
-            return self._history().ran_at(tick).level(name)
+            return self.history().ran_at(tick).level(name)
         except KeyError as error:
             raise Refused(Code.STUDIO, f"the run has no level `{name}`") from error
 
     def _moment(self, ask: Ask) -> Json:
-        return self._shown.moment(self._history(), self._tick(ask))
+        return self._shown.moment(self.history(), self._tick(ask))
 
     def _tracks(self, ask: Ask) -> Json:
         """Every change of a level's line after a tick; `era` says whether what the page has is still so."""
-        history = self._history()
+        history = self.history()
         since = ask.body.whole("since", -1, 2**53)
         known = since if ask.body.whole("era", -1, 2**53) == history.era and history.first <= since else -1
         levels, to = self._lines.changes(history, known)
@@ -167,7 +169,7 @@ class TimeLine:
     def _values(self, ask: Ask) -> Json:
         """Every variable of a level as a tick left it, and which the tick changed."""
         tick = self._tick(ask)
-        history = self._history()
+        history = self.history()
         logged = self._level(ask, tick)
         try:
             now, before = (
@@ -231,7 +233,7 @@ class TimeLine:
         if len(text) > LONGEST:
             raise Refused(Code.STUDIO, f"a condition of more than {LONGEST} characters")
         tick, back = self._tick(ask), ask.body.flag("back")
-        history = self._history()
+        history = self.history()
         ticks = range(tick - 1, history.first, -1) if back else range(tick + 1, history.last + 1)
         asked: dict[int, Any] = {}
         for count, at in enumerate(ticks):
@@ -254,16 +256,6 @@ class _Marked:
     tick: int
     kind: str
     text: str
-
-
-def _named(level: LoggedLevel) -> dict[str, Any]:
-    tables = {table: list(level.sign.tables.get(table, ())) for table in level.level.every_table}
-    return {
-        "name": level.name,
-        "period_ms": level.level.period_ms,
-        "tables": tables,
-        "program": level.sign.program,
-    }
 
 
 def _leaf(sign: Signature, at: int) -> dict[str, Any]:

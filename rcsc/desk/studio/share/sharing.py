@@ -11,7 +11,7 @@ from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import LATER, Ask, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
 from rcsc.desk.studio.scene import Cell
@@ -24,7 +24,7 @@ MOST_AROUND = 1000
 _ODD = re.compile(r"[^A-Za-z0-9_]+")
 
 
-class Moments:
+class Moments(Concern):
     """Hands on moments of the run that everybody looks at."""
 
     name, lane = "share", LANE
@@ -38,25 +38,13 @@ class Moments:
         """By kind."""
         return {"share.moment": self._moment}
 
-    def greeting(self) -> Json:
-        """Nothing."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing is to be done."""
-
-    def close(self) -> None:
-        """Nothing is held."""
-
     def _moment(self, ask: Ask) -> Json:
         """Gather ticks one after another, the lane free for others in between."""
-        source = self._time.source
-        if not source.history.logs:
-            raise Refused(Code.STUDIO, f"no run is there: {self._time.live.why}")
-        tick = ask.body.whole("tick", source.history.first, source.history.last)
+        history = self._time.history()
+        era = history.era
+        tick = ask.body.whole("tick", history.first, history.last)
         around = ask.body.whole("around", 0, MOST_AROUND)
-        title = source.name or str(source.history.logs[0].facts["name"])
-        history, era = source.history, source.history.era
+        title = self._time.source.name or str(history.logs[0].facts["name"])
         pieces = film(history, tick, around, lambda at: self._cell.drawing(at, projected=False))
 
         def piece() -> Json:
@@ -74,7 +62,7 @@ class Moments:
         return piece()
 
 
-class Findings:
+class Findings(Concern):
     """Hands on findings of the files that are open."""
 
     name, lane = "handed", PROOF
@@ -87,16 +75,6 @@ class Findings:
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
         return {"handed.finding": self._finding}
-
-    def greeting(self) -> Json:
-        """Nothing."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing is to be done."""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
     def _finding(self, ask: Ask) -> Json:
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)

@@ -11,7 +11,7 @@ from rcsc.base.host.files.read import CheckedFields
 from rcsc.desk.editor import keys
 from rcsc.desk.editor.places import Area, Edit, Lines, Place, Units
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import Ask, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables import cells
 from rcsc.desk.studio.tables.desk import Desk
 from rcsc.desk.studio.tables.document import MOST_BYTES, Document, plain
@@ -33,7 +33,7 @@ KEYS: Mapping[str, tuple[keys.Act, str]] = {
 """What keys do in tables of a text, and what that is called where it is undone."""
 
 
-class Tables:
+class Tables(Concern):
     """Opens, changes and saves files; in the lane `tables`, which waits for no proof."""
 
     name, lane = "tables", "tables"

@@ -12,7 +12,7 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.desk.editor.lenses import run_at
 from rcsc.desk.editor.values import Repair
 from rcsc.desk.shell.reload.refusal import Refused
-from rcsc.desk.studio.hub import PROVER, Ask, Handler, Json
+from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables import shown
 from rcsc.desk.studio.tables.arrows import arrow_drawn
 from rcsc.desk.studio.tables.desk import PROOF, Desk
@@ -35,7 +35,7 @@ MOST_GRAPHS = 16
 """Graphs that are kept as they were derived."""
 
 
-class Proof:
+class Proof(Concern):
     """Repairs, and lines under a condition."""
 
     name, lane = "proof", PROOF
@@ -53,16 +53,6 @@ class Proof:
             "proof.run": self._run,
             "proof.filter": self._filter,
         }
-
-    def greeting(self) -> Json:
-        """Nothing."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing is to be done."""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
     def _offered(self, ask: Ask) -> tuple[str, int, tuple[Repair, ...]]:
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
@@ -139,7 +129,7 @@ class Proof:
         raise Refused(Code.STUDIO, f"`{condition}`: {wrong[0].message}", *wrong[0].help)
 
 
-class Graphs:
+class Graphs(Concern):
     """Graphs of tables, and arrows that are drawn in them."""
 
     name, lane = "graph", PROOF
@@ -153,16 +143,6 @@ class Graphs:
     def handlers(self) -> Mapping[str, Handler]:
         """By kind."""
         return {"graph.show": self._show, "graph.draw": self._draw}
-
-    def greeting(self) -> Json:
-        """Nothing."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing is to be done."""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
     def _show(self, ask: Ask) -> Json:
         """Place the graph of a table, some of its composite states shut."""

@@ -17,7 +17,7 @@ from rcsc.desk.editor.names.tokens import TYPES, tokens
 from rcsc.desk.editor.places import Lines, Place, Units
 from rcsc.desk.editor.standing import BEING_PROVED
 from rcsc.desk.editor.workspace import Workspace
-from rcsc.desk.studio.hub import Ask, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables.desk import Desk
 from rcsc.desk.studio.tables.editing import MOST_LINES
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rcsc.desk.editor.values import Grid
 
 
-class Writing:
+class Writing(Concern):
     """Answers about names at places of a text."""
 
     name, lane = "text", "text"
@@ -44,16 +44,6 @@ class Writing:
             "text.declared": self._declared,
             "text.colours": self._colours,
         }
-
-    def greeting(self) -> Json:
-        """Nothing."""
-        return {}
-
-    def begin(self) -> None:
-        """Nothing is to be done."""
-
-    def close(self) -> None:
-        """Nothing is held."""
 
     def _names(self, ask: Ask) -> tuple[Names, str]:
         """The names of a file as a page has seen it, with all that it uses, and its path.
