@@ -238,9 +238,7 @@ def running_level(
     Raises:
         BadDescription: A buffer or a feed names what the program does not have, or what does not fit.
     """
-    level = next((level for level in sign.levels if level.name == spec.name), None)
-    if level is None:
-        raise BadDescription(f"program `{sign.program}` has no level `{spec.name}`")
+    level = sign.level_of(spec.name)
     takes: list[tuple[str, int, int]] = []
     gives: list[tuple[str, int, int]] = []
     for wire in system.wires:

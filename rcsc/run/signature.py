@@ -274,6 +274,17 @@ class Signature:
             raise KeyError(name)
         return range(places[0], places[-1] + 1)
 
+    def level_of(self, name: str) -> LevelSign:
+        """The level of that name.
+
+        Raises:
+            BadDescription: The program has none.
+        """
+        for level in self.levels:
+            if level.name == name:
+                return level
+        raise BadDescription(f"program `{self.program}` has no level `{name}`")
+
     def table_of(self, level: LevelSign, values: Values) -> str:
         """The table that the level ran in the cycle that left these values; of several the last, or the one that ended the cycle."""
         if level.stages and int(values[len(self.leaves) + 1]) in _ENDED_BY_A_TABLE:

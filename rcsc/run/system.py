@@ -256,6 +256,7 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
     """An executor for each level.
 
     Raises:
+        BadDescription: A program has no such level.
         NotBuilt: The C could not be built.
     """
     return several_executors(system, signs, kind)()
@@ -267,11 +268,10 @@ def several_executors(
     """Return what makes an executor for each level, others at each call, of C that is read and built once.
 
     Raises:
+        BadDescription: A program has no such level.
         NotBuilt: The C could not be built.
     """
-    levels = {
-        name: next(level for level in sign.levels if level.name == name) for name, sign in signs.items()
-    }
+    levels = {name: sign.level_of(name) for name, sign in signs.items()}
     if kind == "python":
         return lambda: {
             name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()
@@ -292,9 +292,6 @@ def assemble(
     refuse_unproved(system)
     signs = signatures(system)
     check_answered(system, queries)
-    for name, sign in signs.items():
-        if not any(level.name == name for level in sign.levels):
-            raise BadDescription(f"program `{sign.program}` has no level `{name}`")
     by_level = executors(system, signs, kind)
     levels: Sequence[RunningLevel] = [
         running_level(spec, system, signs[spec.name], by_level[spec.name], queries) for spec in system.levels

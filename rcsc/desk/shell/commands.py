@@ -133,7 +133,7 @@ class Commands:
         for level in self.session.levels:
             yield from (level.name, f"{level.name}-level")
             yield from (f"{level.name}.{leaf.name}" for leaf in level.sign.leaves)
-            for table in typed_names.tables_of(level):
+            for table in level.level.every_table:
                 yield from (f"{level.name}.{table}.{line}" for line in level.sign.tables[table])
         yield from (leaf.name for leaf in self.session.level.sign.leaves)
         yield from self._parts(self.session.level)
@@ -253,7 +253,7 @@ class Commands:
         _nothing("levels", rest)
         return [
             f"{'*' if level.name == self.session.chosen else ' '} {level.name:14} every {level.level.period_ms} ms: "
-            f"{', '.join(typed_names.tables_of(level))}"
+            f"{', '.join(level.level.every_table)}"
             for level in self.session.levels
         ]
 

@@ -114,16 +114,11 @@ def line_of(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> 
     """The line that `level.table.line`, or `table.line` of the level chosen, names; None where it names none."""
     level, rest = split(text, levels, chosen)
     table, _, line = rest.partition(".")
-    known = known_name(table, tables_of(level))
+    known = known_name(table, level.level.every_table)
     if known is None:
         return None
     named = known_name(line, level.sign.tables[known])
     return None if named is None else NamedLine(level.name, known, named)
-
-
-def tables_of(level: RunningLevel) -> tuple[str, ...]:
-    """The tables that a level may run."""
-    return level.level.every_table
 
 
 def value_of(leaf: Leaf, text: str) -> Value:

@@ -242,7 +242,7 @@ def _level(
     spec: LevelSpec, tick_ms: int, words: tuple[str, str], buffers: Sequence[Buffer], wiring: "_Wiring"
 ) -> LinkedLevel:
     program = wiring.programs[spec.name]
-    level = next(level for level in program.sign.levels if level.name == spec.name)
+    level = program.sign.level_of(spec.name)
     return LinkedLevel(
         spec.name,
         *words,

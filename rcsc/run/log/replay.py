@@ -224,9 +224,6 @@ class Replay:
         """
         system = self.log.system(self.generated)
         signs = signatures(system, fitting=False)  # each level runs alone
-        for name, sign in signs.items():
-            if not any(level.name == name for level in sign.levels):
-                raise BadDescription(f"program `{sign.program}` has no level `{name}`")
         by_level = executors(system, signs, self.kind)
         self.unchanged = fingerprints(system) == dict(self.log.programs)
         for level in self.log.levels:
@@ -297,7 +294,7 @@ class Replay:
 
 
 def _again(logged: LoggedLevel, sign: Signature, executor: Executor, unchanged: bool) -> _Again:
-    level = next(level for level in sign.levels if level.name == logged.name)
+    level = sign.level_of(logged.name)
     aside = frozenset() if unchanged else _ASIDE - logged.sign.index.keys()
     return _Again(logged, sign, level, executor, sign == logged.sign, sign.packed, aside)
 

@@ -203,7 +203,7 @@ def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterat
 def _level(setting: Setting, name: str, sign: Signature) -> RunningLevel:
     system = setting.description
     spec = next(spec for spec in system.levels if spec.name == name)
-    level = next(level for level in sign.levels if level.name == name)
+    level = sign.level_of(name)
     executor = (
         CExecutor(build(system.generated, [sign]), sign, level)
         if setting.kind == "c"

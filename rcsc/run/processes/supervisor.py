@@ -79,10 +79,7 @@ class Supervisor:
         self._told: dict[str, Connection] = {}
         self._pulses: dict[str, _Pulse] = {}
         periods_ms = dict.fromkeys(outside, description.tick_ms) | {
-            name: level.period_ms
-            for name, sign in self._signs.items()
-            for level in sign.levels
-            if level.name == name
+            name: sign.level_of(name).period_ms for name, sign in self._signs.items()
         }
         self._still_s = {
             name: max(STILL_S, STILL_PERIODS * period_ms / 1000 / (rate or 1.0))
@@ -221,7 +218,7 @@ class Supervisor:
         if isinstance(values, NotShared):
             return f"level `{name}`: a fault"
         sign = self._signs[name]
-        level = next(level for level in sign.levels if level.name == name)
+        level = sign.level_of(name)
         ran = sign.table_of(level, values)
         table, saw = f", table `{ran}`" if level.stages else "", sign.witness(ran, values)
         return f"level `{name}`{table}: {sign.fault_text(values)}" + (f"; it saw {saw}" if saw else "")

@@ -26,12 +26,8 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666, *, durable: 
     Raises:
         OSError: It could not be written; nothing is left behind, and what was there before is kept.
     """
-    target = path.resolve()
-    if target.exists() and not target.is_file():
-        target.write_bytes(content)  # a device or a pipe is not replaced
-        return
-    with written_whole(target, mode, durable=durable) as beside, beside.open("r+b") as file:
-        file.write(content)
+    with written_whole(path, mode, durable=durable) as beside:
+        beside.write_bytes(content)
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:

@@ -30,17 +30,15 @@ class LeafSymbol:
 class TracePlaces:
     """The places of the trace in the struct; `who` is a C expression of the struct."""
 
-    line_path: str = "line"
-    fault_at_path: str = "fault_at"
     failed_paths: tuple[str, ...] = ("assumptions_failed",)
 
     def line(self, who: str) -> str:
         """The line taken."""
-        return f"{who}.{self.line_path}"
+        return f"{who}.line"
 
     def fault_at(self, who: str) -> str:
         """The leaf that was refused."""
-        return f"{who}.{self.fault_at_path}"
+        return f"{who}.fault_at"
 
     def clear(self, who: str) -> str:
         """Statements that make the trace what it is before a cycle."""
