@@ -378,8 +378,8 @@ def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
     try:
         symbols = inside(generated, "c", f"{identifier(program, 'program')}.json")
         try:
-            word = _parsed(text(symbols, MOST_SYMBOL_BYTES)).name("program")
-        except (OSError, Malformed):
+            word = _signature(text(symbols, MOST_SYMBOL_BYTES)).program
+        except (OSError, ValueError):
             word = program
         return symbols, *sources_of(generated, word)
     except BadName as error:
@@ -411,13 +411,8 @@ def signature(path: Path) -> Signature:
 
 
 @lru_cache(maxsize=16)  # to assemble a system reads each symbol file several times
-def _parsed(symbols: str) -> CheckedFields:
-    return CheckedFields(json_of(symbols))
-
-
-@lru_cache(maxsize=16)
 def _signature(symbols: str) -> Signature:
-    return signature_of(_parsed(symbols))
+    return signature_of(CheckedFields(json_of(symbols)))
 
 
 def signature_of(symbols: CheckedFields) -> Signature:
@@ -433,7 +428,7 @@ def signature_of(symbols: CheckedFields) -> Signature:
     index = {leaf.name: at for at, leaf in enumerate(leaves)}
     if len(index) < len(leaves):
         raise Malformed("two leaves have one name")
-    tables, stops = _tables(symbols)
+    tables, stops, sees = _tables(symbols)
     levels = tuple(_level(level, program, index) for level in symbols.each("levels", MOST_LEVELS))
     if len(tables) == 0 and levels:
         raise Malformed("it has levels and no table")
@@ -455,17 +450,8 @@ def signature_of(symbols: CheckedFields) -> Signature:
         {index[name]: adopted for name, adopted in _restart(symbols, leaves).items()},
         _serves(symbols, leaves),
         _unset(symbols, index),
-        _sees(symbols),
+        sees,
     )
-
-
-def _sees(symbols: CheckedFields) -> dict[str, tuple[str, ...]]:
-    """What each table sees; a symbol file says it of each table, a log keeps a mapping."""
-    if isinstance(symbols.value.get("tables"), dict):
-        sees = symbols.table("sees") if "sees" in symbols.value else CheckedFields({})
-        return {identifier(name, "table"): sees.members(name) for name in sees.value}
-    several = symbols.each("tables", MOST_LEVELS)
-    return {table.name("name"): table.members("sees") for table in several if "sees" in table.value}
 
 
 def _unset(symbols: CheckedFields, index: Mapping[str, int]) -> tuple[Unset, ...]:
@@ -615,21 +601,26 @@ def _fits(c_type: str, value: object) -> bool:
     return bool(held == value)
 
 
-def _tables(symbols: CheckedFields) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
-    """Return the lines of each table, and what stops it; a symbol file lists tables, a log keeps two mappings."""
+_ByTable: TypeAlias = dict[str, tuple[str, ...]]
+
+
+def _tables(symbols: CheckedFields) -> tuple[_ByTable, _ByTable, _ByTable]:
+    """Return the lines of each table, what stops it, and what it sees; a symbol file lists tables, a log keeps mappings."""
     if isinstance(symbols.value.get("tables"), dict):
-        lines, stops = (
-            symbols.table("tables"),
-            symbols.table("stops") if "stops" in symbols.value else CheckedFields({}),
+        lines, stops, sees = (
+            symbols.table(key) if key in symbols.value else CheckedFields({})
+            for key in ("tables", "stops", "sees")
         )
         return (
             {identifier(name, "table"): lines.lines(name) for name in lines.value},
             {identifier(name, "table"): stops.names(name) for name in stops.value},
+            {identifier(name, "table"): sees.members(name) for name in sees.value},
         )
     several = tuple(symbols.each("tables", MOST_LEVELS))
     return (
         {table.name("name"): table.lines("lines") for table in several},
         {table.name("name"): table.names("stops") for table in several if "stops" in table.value},
+        {table.name("name"): table.members("sees") for table in several if "sees" in table.value},
     )
 
 
