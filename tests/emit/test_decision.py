@@ -1,9 +1,7 @@
 """How executors find the line: cuts, ifs and masks say of every input which lines match, of tables that are wrong, too."""
 
-import re
 from collections import Counter
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -11,7 +9,6 @@ import pytest
 
 from rcsc.base.host.tools import Absent, c_compiler
 from rcsc.code.emit import decision as decisions
-from rcsc.code.emit import lower as lower_module
 from rcsc.code.emit.decision import Cut, decision, depth, ends
 from rcsc.code.emit.lower import lower
 from rcsc.code.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
@@ -100,13 +97,13 @@ def test_what_was_made_by_cuts_is_parted_by_as_few(lines: int, variables: int) -
     assert depth(found) <= lines.bit_length() + 2
 
 
-def test_an_end_that_is_exact_is_so_for_all_its_classes() -> None:
-    """By brute force over masks of which nothing is known; where few are enough, an end may keep what is told apart."""
-    random, kinds = Random(5), Counter[bool]()  # noqa: S311  # repeatable
-    for round_ in range(300):
+def test_an_end_keeps_what_matches_for_all_its_classes() -> None:
+    """By brute force over masks of which nothing is known."""
+    random = Random(5)  # noqa: S311  # repeatable
+    for _ in range(300):
         sizes = [random.randint(1, 4) for _ in range(3)]
         probes = [[random.getrandbits(5) for _ in range(size)] for size in sizes]
-        found = decision(probes, 31, 1000, few=round_ % 3)
+        found = decision(probes, 31, 1000)
         assert found is not None
         for a in range(sizes[0]):
             for b in range(sizes[1]):
@@ -116,9 +113,7 @@ def test_an_end_that_is_exact_is_so_for_all_its_classes() -> None:
                     while isinstance(at, Cut):
                         at = at.above if place[at.probe] >= at.first else at.below
                     left = probes[0][a] & probes[1][b] & probes[2][c]
-                    assert left == at.lines if at.exact else left & ~at.lines == 0
-                    kinds[at.exact] += 1
-    assert min(kinds[True], kinds[False]) > 100
+                    assert left == at.lines
 
 
 def ladder(lines: int, *, apart: bool) -> str:
@@ -137,12 +132,11 @@ def ladder(lines: int, *, apart: bool) -> str:
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 @pytest.mark.parametrize(("lines", "count"), [(8, 4000), (70, 400)])
 def test_a_table_that_no_few_cuts_part_is_decided_by_masks(lines: int, count: int) -> None:
-    """Ifs would be as many as combinations of all leaves, and so would windows."""
+    """Ifs would be as many as combinations of all leaves."""
     program = program_of(ladder(lines, apart=False))
     files = emitted(program)
     [module] = [code for name, code in files.items() if name.endswith(".py")]
     assert "_T_" in module
-    assert not any("t.order" in text for text in files.values())
     assert isinstance(check(program, files), Checked)
     answers = compared(program, count)
     assert answers[SEVERAL] > 0
@@ -166,93 +160,10 @@ def test_a_long_ladder_is_given_up_early() -> None:
     assert decision(masks, (1 << count) - 1, 10 * count) is None
 
 
-# --- windows of many lines in C ---
-
-
-@pytest.fixture(params=[lower_module.MOST_WORDS, 0], ids=["side by side", "apart"])
-def windowed(
-    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
-) -> tuple[Program, dict[str, str]]:
-    """A table of 150 lines, some of which overlap, in windows; in each of the two forms of their words."""
-    monkeypatch.setattr(lower_module, "MOST_WORDS", request.param)
-    program = program_of(box(150, 12, 162, "gap", 20))
-    files = emitted(program)
-    [source] = [text for name, text in files.items() if name.endswith(".c")]
-    assert "t.order[w]" in source
-    assert ("t.words[" in source) == (request.param == 0)
-    return program, files
-
-
 def check(program: Program, files: dict[str, str]) -> Checked | tuple[str, ...]:
     checked = check_matcher(program, symbols_of(program, files), files, program.tables[0])
     assert not isinstance(checked, Absent)
     return checked
-
-
-def instead(new: str, _: str) -> str:
-    return new
-
-
-NUMBERS = {
-    "question": r">= (?P<number>\d+)u?\) \?",
-    "window": r"\? (?P<number>\d+)u : ",
-    "order": r"\} t = \{\s*\{[^{]*\{\s*(?P<number>\d+)",
-    "mask": r"0x(?P<bits>[0-9a-f]+)ULL",
-    "place": r"\{\s*(?P<number>\d+),\d+,",
-}
-
-
-@pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
-@pytest.mark.parametrize("part", NUMBERS)
-def test_every_number_of_a_window_is_checked(part: str, windowed: tuple[Program, dict[str, str]]) -> None:
-    """A changed number is noticed, or no input that is tried can tell."""
-    program, files = windowed
-    [(path, source)] = [(name, text) for name, text in files.items() if name.endswith(".c")]
-    begin = source.index("_match_t(const ")
-    end = source.index("\n}\n", begin)
-    random, noticed, given = Random(8), 0, list(samples(program, 2000))  # noqa: S311  # repeatable
-    found = list(re.compile(NUMBERS[part]).finditer(source, begin, end))
-    for match in random.sample(found, min(6, len(found))):
-        kind = match.lastgroup or ""
-        number = int(match[kind], 16) ^ 1 << random.randrange(64) if kind == "bits" else int(match[kind]) ^ 1
-        changed = f"{source[: match.start(kind)]}{number:{'x' if kind == 'bits' else 'd'}}{source[match.end(kind) :]}"
-        if isinstance(check(program, files | {path: changed}), tuple):
-            noticed += 1
-            continue
-        with executors_of(program, c=partial(instead, changed)) as executors:
-            [target] = [target for target in executors.targets if target.kind == "line"]
-            assert run_lines(executors, target, given, AgreementCount()) is None
-    assert noticed > 0
-
-
-def test_windows_are_checked_as_they_are(windowed: tuple[Program, dict[str, str]]) -> None:
-    checked = check(*windowed)
-    assert isinstance(checked, Checked)
-    assert checked.masks % (1 + 64 + 64 * 63 // 2) == 0
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("const uint32_t w = ", "const uint32_t w = s->x0 ? 1u : "),
-        ("const uint64_t m = ", "const uint64_t m = ~"),
-        ("] &", "] |"),
-        ("t.order[w]", "t.order[0u]"),
-        ("(m - UINT64_C(1))", "(m - UINT64_C(2))"),
-        ("? (-1) :", "? 0 :"),
-        ("line = several", "line = s->x0"),
-    ],
-)
-def test_a_matcher_of_another_shape_is_not_checked(
-    old: str, new: str, windowed: tuple[Program, dict[str, str]]
-) -> None:
-    program, files = windowed
-    begin = {name: max(text.find("_match_t(const "), 0) for name, text in files.items()}
-    changed = {
-        name: text[: begin[name]] + text[begin[name] :].replace(old, new, 1) for name, text in files.items()
-    }
-    assert changed != files
-    assert isinstance(check(program, changed), tuple)
 
 
 def mixed(blocks: int) -> str:
@@ -278,12 +189,9 @@ def mixed(blocks: int) -> str:
 
 
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
-def test_windows_are_found_by_wide_numbers_and_reals_and_fall_to_default() -> None:
+def test_many_lines_are_found_by_wide_numbers_and_reals_and_fall_to_default() -> None:
     program = program_of(mixed(40))
-    files = emitted(program)
-    [source] = [text for name, text in files.items() if name.endswith(".c")]
-    assert "t.order[w]" in source
-    assert isinstance(check(program, files), Checked)
+    assert isinstance(check(program, emitted(program)), Checked)
     answers = compared(program, 1500)
     assert answers[120] > 100
     assert len(answers) > 80
@@ -300,33 +208,10 @@ def test_a_line_that_matches_nowhere_is_not_waited_for() -> None:
 
 @pytest.mark.needs("valgrind")
 @pytest.mark.parametrize(
-    ("lines", "variables", "most"), [(64, 7, 36), (256, 20, 115), (1024, 20, 160)], ids=str
+    ("lines", "variables", "most"), [(64, 7, 36), (256, 20, 161), (1024, 20, 323)], ids=str
 )
 def test_a_match_takes_few_instructions(lines: int, variables: int, most: int, tmp_path: Path) -> None:
-    """Of this compiler, a fifth above what was measured; a word after another took 134 and 269 for the last two."""
+    """Of this compiler, a fifth above what was measured."""
     program = program_of(box(lines, variables, lines + variables), "bench.rcs")
     ours, _, _ = c_counts(tmp_path, program, emitted(program), beside=False)
     assert 20 < ours <= most
-
-
-def test_the_c_of_a_large_table_is_small() -> None:
-    """It was 14.9 MB; 0.93 were measured."""
-    program = program_of(box(4096, 50, 4146))
-    [source] = [text for name, text in emitted(program).items() if name.endswith(".c")]
-    assert len(source) < 1_150_000
-
-
-@pytest.mark.needs("valgrind")
-@pytest.mark.parametrize(("lines", "variables", "widened"), [(70, 9, 0), (200, 12, 100)])
-def test_the_shape_that_is_chosen_takes_fewer_instructions(
-    lines: int, variables: int, widened: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = program_of(box(lines, variables, lines + variables, "ok", widened), "bench.rcs")
-    counts = {}
-    for shape, of_a_cut in (("windows", lower_module.OF_A_CUT), ("words", 1_000_000)):
-        monkeypatch.setattr(lower_module, "OF_A_CUT", of_a_cut)
-        (tmp_path / shape).mkdir()
-        files = emitted(program)
-        assert any("t.order" in text for text in files.values()) == (shape == "windows")
-        counts[shape], _, _ = c_counts(tmp_path / shape, program, files, beside=False)
-    assert counts["windows"] < counts["words"]

@@ -1,15 +1,15 @@
 """Decisions: a tree of cuts through the classes of leaves, which parts the lines of a table.
 
 In: for each probe of a table the masks of its classes. Out: a tree whose inner nodes ask whether the class of one
-probe is at least some number, and whose ends keep the lines that may still match there.
+probe is at least some number, and whose ends keep the lines that match there.
 
 >>> wide, full = (0b001, 0b110), (0b011, 0b101)
 >>> decided = decision((wide, full), 0b111, most=4)
->>> [(end.lines, end.exact) for end in ends(decided)]
-[(1, True), (2, True), (4, True)]
+>>> [end.lines for end in ends(decided)]
+[1, 2, 4]
 
-Nothing is taken from a proof: a line is left out only where its own masks exclude it. So an end that is exact, where each
-line that is left holds throughout, knows its answer: none, that line, or several; where it is not, masks go on from it.
+Nothing is taken from a proof: a line is left out only where its own masks exclude it. At an end each line that is left
+holds throughout, so that it knows its answer: none, that line, or several.
 
 The cut is the one after which the squares of how many lines are left on both sides sum up to least: it halves the lines
 where it can, and does not keep many on both sides.
@@ -28,12 +28,10 @@ class End:
     """An end of the tree, where nothing more is asked.
 
     Attributes:
-        lines: The lines that are left, a bit each.
-        exact: Whether every one of them holds for all inputs that come here.
+        lines: The lines that are left, a bit each; every one of them holds for all that comes here.
     """
 
     lines: int
-    exact: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,28 +58,19 @@ class _TooManyError(Exception):
     """The tree would have too many ends, or be too deep."""
 
 
-def decision(probes: Sequence[Masks], everyone: int, most: int, few: int = 0) -> Decision | None:
+def decision(probes: Sequence[Masks], everyone: int, most: int) -> Decision | None:
     """Return a tree of cuts; None where it would have too many ends, or be deeper than `DEEPEST`.
 
     Args:
         probes: For each the masks of its classes.
         everyone: A mask with every line.
         most: Ends that it may have.
-        few: Lines up to which nothing more is asked; 0 asks until all ends are exact.
     """
-    grower = _Grower(probes, most, few)
+    grower = _Grower(probes, most)
     try:
         return grower.grown(everyone, tuple((0, len(masks)) for masks in probes), DEEPEST)
     except _TooManyError:
         return None
-
-
-def cuts(decided: Decision) -> Iterator[Cut]:
-    """Yield the questions, each after those that are asked after it."""
-    if isinstance(decided, Cut):
-        yield from cuts(decided.below)
-        yield from cuts(decided.above)
-        yield decided
 
 
 def ends(decided: Decision) -> Iterator[End]:
@@ -102,18 +91,17 @@ def depth(decided: Decision) -> int:
 class _Grower:
     probes: Sequence[Masks]
     left: int
-    few: int
 
     def grown(self, lines: int, spans: Spans, deep: int) -> Decision:
         """Return the tree for the lines that may match within these classes."""
         for every, (low, high) in zip(self.probes, spans, strict=True):
             lines &= reduce(or_, every[low:high], 0)  # one that matches nowhere here is not waited for
-        cut = None if lines.bit_count() <= self.few else self._best(lines, spans)
+        cut = self._best(lines, spans)
         if cut is None:
             self.left -= 1
             if self.left < 0:
                 raise _TooManyError
-            return End(lines, exact=not any(True for _ in self._open(lines, spans)))
+            return End(lines)
         if deep == 0:
             raise _TooManyError
         at, first, below, above = cut

@@ -1,18 +1,13 @@
 """A proved program to a `Plan`: classes, masks and their grouping."""
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from math import prod
 
-from rcsc.code.emit.decision import decision, ends
 from rcsc.code.emit.plan import (
     WORD,
     Coded,
     Cuts,
     Direct,
-    Group,
     Index,
     Matcher,
     Plan,
@@ -20,7 +15,6 @@ from rcsc.code.emit.plan import (
     PlanTable,
     Probe,
     Truth,
-    Windows,
     grouped,
 )
 from rcsc.lang.interval_sets import holds
@@ -51,13 +45,6 @@ MOST_GROUPED = 512
 """Combinations of classes up to which leaves share a table of masks of several words."""
 FEW_GROUPED = 24
 """The same where a mask is one word: as many rows as a person reads, and no more bytes than one table for each leaf."""
-
-OF_A_CUT, OF_A_WORD = 4, 7
-"""Instructions of one question that finds a window, and of one word of masks beside the masks joined in it: measured."""
-MOST_WORDS = 1 << 16
-"""Words of masks up to which they stand in their tables; more are kept once each."""
-MOST_CODES = 1 << 18
-"""Places of words up to which leaves share a table of them."""
 
 
 def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False, prefix: str = "") -> Plan:
@@ -159,36 +146,9 @@ def _matcher(program: Program, table: Table) -> Matcher:
     everyone = (1 << len(table.lines)) - 1
     probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
     probes += [_test_probe(truth, lines, everyone) for truth, lines in relational.values()]
-    matcher = partial(Matcher, len(table.lines), table.default is not None)
-    if len(table.lines) <= WORD:
-        return matcher(grouped(probes, FEW_GROUPED, shifted=True))
-    return _of_windows(matcher, probes, everyone) or matcher(grouped(probes, MOST_GROUPED))
-
-
-def _of_windows(matcher: Callable[..., Matcher], probes: list[Probe], everyone: int) -> Matcher | None:
-    """Return the matcher by windows, where few cuts part the lines so that it costs less than joining whole masks; else None."""
-    leaves = tuple(probe for probe in probes if not isinstance(probe.index, Truth))
-    words = -(-everyone.bit_length() // WORD)
-    groups = grouped(probes, MOST_GROUPED)
-    whole = words * (len(groups) + OF_A_WORD)
-    decided = decision([probe.masks for probe in leaves], everyone, 1 + whole // OF_A_CUT, WORD)
-    found = [] if decided is None else list(ends(decided))
-    if decided is None or any(end.lines.bit_count() > WORD for end in found):
-        return None
-    if OF_A_CUT * (len(found) - 1) + OF_A_WORD + len(groups) >= whole:
-        return None
-    if len(found) * _entries(groups) <= MOST_WORDS:
-        return matcher(groups, Windows(leaves, decided, apart=False))
-    for most in (MOST_GROUPED, MOST_GROUPED // 4, MOST_GROUPED // 16, 1):
-        groups = grouped(probes, most)
-        if len(found) * _entries(groups) <= MOST_CODES:
-            break
-    return matcher(groups, Windows(leaves, decided, apart=True))
-
-
-def _entries(groups: tuple[Group, ...]) -> int:
-    """Count the masks in the tables of the groups."""
-    return sum(prod(len(probe.masks) for probe in group) for group in groups)
+    one_word = len(table.lines) <= WORD
+    groups = grouped(probes, FEW_GROUPED if one_word else MOST_GROUPED, shifted=one_word)
+    return Matcher(len(table.lines), table.default is not None, groups)
 
 
 def _declared(

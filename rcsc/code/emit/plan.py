@@ -5,13 +5,12 @@ several leaves together), and the class's mask has a bit for each line that it d
 """
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import prod
 from typing import TypeAlias
 
 from rcsc.base.host.files.write import UNPROVED
-from rcsc.code.emit.decision import Cut, Decision, cuts, ends
 from rcsc.lang.model import Action, Expr, LineName, Procedure, Program, Scalar, Table, TableName, VariableName
 
 WORD = 64
@@ -96,56 +95,22 @@ Group: TypeAlias = tuple[Probe, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Windows:
-    """Cuts of a table of many lines into windows of at most one word; masks tell which line of a window it is.
-
-    Attributes:
-        probes: The leaves that `decided` asks about.
-        decided: The window of an input: each end is a window, which has every line that may match there.
-        apart: Whether the masks' words are kept once each, and the tables keep their places.
-    """
-
-    probes: tuple[Probe, ...]
-    decided: Decision
-    apart: bool
-
-    @property
-    def cuts(self) -> tuple[Cut, ...]:
-        """The questions, each after those that are asked after it."""
-        return tuple(cuts(self.decided))
-
-    @property
-    def lines(self) -> tuple[tuple[int, ...], ...]:
-        """For each window its lines, from the lowest bit."""
-        return tuple(tuple(members(end.lines)) for end in ends(self.decided))
-
-
-@dataclass(frozen=True, slots=True)
 class Matcher:
     """The matcher of one table.
 
     Attributes:
         lines: How many lines, DEFAULT left out.
         default: Whether there is a DEFAULT line: it is taken where no other matches.
-        windows: Where C looks for the line, if not at all lines.
     """
 
     lines: int
     default: bool
     groups: tuple[Group, ...]
-    windows: Windows | None = None
 
     @property
     def words(self) -> int:
         """Machine words of 64 lines in a mask."""
         return (self.lines + WORD - 1) // WORD
-
-
-def members(mask: int) -> Iterator[int]:
-    """Yield the lines of a mask, in order."""
-    while mask:
-        yield (mask & -mask).bit_length() - 1
-        mask &= mask - 1
 
 
 def joined(group: Group) -> tuple[int, ...]:

@@ -264,8 +264,7 @@ def decider(
 ) -> Decider:
     """What the complete check of the tables in `checked` knows, by place in the C file.
 
-    A number whose value is not the one that the check read from the compiled C is left out, and so are tables whose matcher
-    works in windows.
+    A number whose value is not the one that the check read from the compiled C is left out.
     """
     source = variants(source_of(symbols, files))[0]
     places: dict[int, tuple[Compared, int, int]] = {}

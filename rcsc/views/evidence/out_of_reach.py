@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from rcsc.code.emit.c.ctext import DIVIDED, SHORT, c_type
 from rcsc.code.emit.c.helpers import HELD
 from rcsc.code.emit.identifiers import Names
-from rcsc.code.emit.plan import Cuts, Direct, Plan, PlanTable, Truth
+from rcsc.code.emit.plan import Cuts, Direct, Plan, Truth
 from rcsc.code.testing.agree import NONE, SEVERAL
 from rcsc.code.testing.coverage.case import outside_of
 from rcsc.code.testing.coverage.directed import Unreached
@@ -188,7 +188,7 @@ class Reasons:
     def _line_keys(self, table: Table) -> list[Hashable]:
         """Return the key of each comparison of a matcher: classes of a leaf, or a condition of a test."""
         planned = next(each for each in self.plan.tables if each.table.name == table.name)
-        keys = list[Hashable](_asked(planned))
+        keys: list[Hashable] = []
         for probe in (probe for group in planned.matcher.groups for probe in group):
             match probe.index:
                 case Direct(leaf=leaf, type=Bool()):
@@ -345,15 +345,3 @@ def _not_seen(points: Sequence[Point]) -> Iterator[tuple[Point, bool]]:
             yield point, True
         if not point.false:
             yield point, False
-
-
-def _asked(planned: PlanTable) -> Iterator[Hashable]:
-    """Yield the classes of a leaf that each question of a matcher compares, if it works in windows."""
-    windows = planned.matcher.windows
-    if windows is None:
-        return
-    for cut in windows.cuts:
-        index = windows.probes[cut.probe].index
-        assert not isinstance(index, Truth)
-        whole = range(index.count)
-        yield "classes", planned.table.name, index.leaf, tuple(whole[: cut.first]), tuple(whole[cut.first :])

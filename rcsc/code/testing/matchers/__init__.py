@@ -13,13 +13,9 @@ combination of the group.
 >>> matcher.__doc__.splitlines()[0]
 'The emitted C matcher is the table, for all inputs: a complete check a variable at a time, for any size.'
 
-Of a table of many lines the matcher first finds a window of lines by questions that form a tree. It is then its table if each
-window has every line that its questions do not exclude, and if each lookup is right for the lines of every window.
-
 Trusted for this: that the emitted function does join the masks by AND, which the reader insists on by the form of the
 text. What it costs: the sizes of the variables, in all.
 
-Modules, in the order the data flows: `matcher_text` reads mask tables and index expressions from the emitted C, `window_text`
-those of a matcher that works in windows; `matcher_c` makes the self-test that runs them compiled, `cells` compares what it gives a
-variable at a time, `windows` does so window by window, and `matcher` puts them together.
+Modules, in the order the data flows: `matcher_text` reads mask tables and index expressions from the emitted C; `matcher_c` makes the
+self-test that runs them compiled, `cells` compares what it gives a variable at a time, and `matcher` puts them together.
 """

@@ -20,7 +20,6 @@ from rcsc.code.testing.matchers.matcher_text import (
     Lookup,
     MatcherText,
 )
-from rcsc.code.testing.matchers.window_text import WindowText
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import (
     Box,
@@ -158,7 +157,7 @@ class Checker:
     program: Program
     symbols: Symbols
     table: Table
-    parts: MatcherText | WindowText
+    parts: MatcherText
     library: ctypes.CDLL
     wrong: list[str] = field(default_factory=list)
     classes: int = 0
@@ -224,8 +223,8 @@ class Checker:
         near = {key + step for key in named for step in (-1, 0, 1)} | {low, high}
         return sorted(key for key in near if low <= key <= high)
 
-    def unary(self, name: str, part: Component, *, shared: bool = False) -> list[tuple[int, int]]:
-        """For each key of a leaf its class and the lines that admit it; whether values of different lines may share one."""
+    def unary(self, name: str, part: Component) -> list[tuple[int, int]]:
+        """For each key of a leaf its class and the lines that admit it."""
         leaf = self.leaf(part.path)
         keys = self.keys(leaf, part)
         words = array("q", [to_word(leaf.type, value_of_key(leaf.type, key)) for key in keys])
@@ -234,7 +233,7 @@ class Checker:
         pairs = list(zip(classes, self.cells_at(leaf, keys), strict=True))
         expected: dict[int, int] = {}
         for key, (at, cells) in zip(keys, pairs, strict=True):
-            if not shared and expected.setdefault(at, cells) != cells:
+            if expected.setdefault(at, cells) != cells:
                 value = value_of_key(leaf.type, key)
                 self.wrong.append(f"`{leaf.name}` = {value} shares its class with a value of other lines")
         return pairs
@@ -325,14 +324,10 @@ class Checker:
         rows, count = edge_rows(self.program, self.table, ROWS)
         tests = relational_tests(self.table)
         self.truths = {at: list(self.run(f"rcsc_test_{at}", count, rows)) for at, _ in enumerate(tests)}
-        self.prepare(rows, count)
         for number, lookup in enumerate(self.parts.lookups):
             self.lookup(number, lookup, rows, count)
         self.everything_stated()
         return Checked(self.cells, self.classes, len(tests), self.tail(), tuple(self.tables))
-
-    def prepare(self, rows: "array[int]", count: int) -> None:
-        """What is compared before the look-ups: nothing here."""
 
     def everything_stated(self) -> None:
         """Whether each leaf and each test that lines state has its place in some look-up."""

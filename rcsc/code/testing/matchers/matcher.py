@@ -28,12 +28,9 @@ from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.matchers.cells import Checked, Checker, Compared
 from rcsc.code.testing.matchers.matcher_c import self_test_c
 from rcsc.code.testing.matchers.matcher_text import (
-    MatcherText,
     ShapeError,
     matcher_text,
 )
-from rcsc.code.testing.matchers.window_text import WindowText, has_windows, window_text
-from rcsc.code.testing.matchers.windows import WindowChecker, window_test_c
 from rcsc.lang.model import (
     Program,
     Table,
@@ -62,27 +59,16 @@ def check_matcher(
     source = next(text for path, text in files.items() if Path(path).name == symbols.source)
     named = (source, symbols.lines[table.name], symbols.struct)
     try:
-        parts = window_text(*named) if has_windows(*named) else matcher_text(*named)
+        parts = matcher_text(*named)
     except ShapeError as error:
         return (f"the emitted C has not the shape that the check is about: {error}",)
     with scratch("matcher") as place:
         beside = [name for name in write_c(files, place) if name == STAND_INS]
-        (place / "check.c").write_text(_self_test(program, symbols, table, parts), "utf-8")
+        (place / "check.c").write_text(self_test_c(program, symbols, table, parts), "utf-8")
         ran = run_command([compiler, *FLAGS, "-o", "check.so", "check.c", *beside], place, 300.0)
         if ran.status != 0:
             return ("the self-test does not compile", *ran.err.strip().splitlines()[:MOST_SHOWN])
         library = ctypes.CDLL(str(place / "check.so"))
-        given = (program, symbols, table)
-        checker = (
-            WindowChecker(*given, parts, library)
-            if isinstance(parts, WindowText)
-            else Checker(*given, parts, library)
-        )
+        checker = Checker(program, symbols, table, parts, library)
         checked = checker.all()
     return tuple(checker.wrong[:MOST_SHOWN]) or checked
-
-
-def _self_test(program: Program, symbols: Symbols, table: Table, parts: MatcherText | WindowText) -> str:
-    if isinstance(parts, WindowText):
-        return window_test_c(program, symbols, table, parts)
-    return self_test_c(program, symbols, table, parts)

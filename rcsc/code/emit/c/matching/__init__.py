@@ -6,14 +6,12 @@ line that the class does not exclude. The words that the inputs choose are joine
 | lines | shape |
 |---|---|
 | up to 64 | one word for all lines |
-| more, parted by few cuts | a window of at most 64 lines is found by questions, then one word is joined in it |
-| more, parted by none | as many words as it takes, one after another |
+| more | as many words as it takes, one after another |
 
-`rcsc.code.emit.lower` chooses the shape by what it costs. None of them takes anything from a proof: that two lines match, or none,
-is seen in the word itself, in every cycle.
+Neither takes anything from a proof: that two lines match, or none, is seen in the words themselves, in every cycle.
 
-Modules, in the order the data flows: `classes` finds the place in a table, `masks` writes tables, `windows` is the second
-shape, and `lines` has the other two and the functions that are called.
+Modules, in the order the data flows: `classes` finds the place in a table, `masks` writes tables, and `lines` has the functions
+that are called.
 """
 
 from rcsc.code.emit.c.matching.lines import line_functions, match_function

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from rcsc.code.emit.c.cprogram import NONE, ONE, CProgram, counted_loop, discarded, touches_state
 from rcsc.code.emit.c.matching.classes import index_of
 from rcsc.code.emit.c.matching.masks import mask_tables, meaning, width, word_code
-from rcsc.code.emit.c.matching.windows import in_windows
 from rcsc.code.emit.code_tree import (
     Cast,
     Choice,
@@ -59,9 +58,6 @@ def line_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
 
 def _match(c: CProgram, table: PlanTable, name: str) -> Iterator[Stmt]:
     matcher = table.matcher
-    if matcher.windows is not None:
-        yield from in_windows(c, table, matcher.windows, name)
-        return
     if matcher.groups:
         yield Line(f"/* {meaning(table)} */")
         yield from mask_tables(table)
