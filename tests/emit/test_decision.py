@@ -13,7 +13,7 @@ from rcsc.code.emit.decision import Cut, decision, depth, ends
 from rcsc.code.emit.lower import lower
 from rcsc.code.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
 from rcsc.code.testing.executors.symbols import symbols_of
-from rcsc.code.testing.matchers.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, check_matcher
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, ProvedProgram, Snapshot, key_bounds, seal_of_proof, value_of_key
 from tests.bench.executors import c_counts
@@ -137,7 +137,9 @@ def test_a_table_that_no_few_cuts_part_is_decided_by_masks(lines: int, count: in
     files = emitted(program)
     [module] = [code for name, code in files.items() if name.endswith(".py")]
     assert "_T_" in module
-    assert isinstance(check(program, files), Checked)
+    checked = check(program, files)
+    assert isinstance(checked, Checked)
+    assert not checked.unmatched
     answers = compared(program, count)
     assert answers[SEVERAL] > 0
     assert lines > 8 or answers[NONE] > 0 < answers[5]
@@ -191,7 +193,9 @@ def mixed(blocks: int) -> str:
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 def test_many_lines_are_found_by_wide_numbers_and_reals_and_fall_to_default() -> None:
     program = program_of(mixed(40))
-    assert isinstance(check(program, emitted(program)), Checked)
+    checked = check(program, emitted(program))
+    assert isinstance(checked, Checked)
+    assert not checked.unmatched
     answers = compared(program, 1500)
     assert answers[120] > 100
     assert len(answers) > 80

@@ -1,11 +1,10 @@
 """Mutants of the emitted C: bits of the masks, constants, operators; each must be noticed or be equivalent.
 
 In: a program, its emitted C, the sessions that its executors agreed on. Out: for each mutant who noticed it.
-A number of a mask or of a class table is decided by the complete check of the matcher, without a run:
-the mutant is noticed, or no input can tell. Any other mutant runs in a process of its own on all the sessions; one that
-leaves the same behind is decided by the check of the matcher where it is in one, else by ESBMC, which proves it
-equal to the reference for all inputs (equivalent) or refutes it. What neither decides is undecided: that is a
-figure, no fault of the C.
+A number of a mask or of a class table is shown to the complete check of the matcher first. Any other mutant, and one that this check
+calls equal, runs in a process of its own on all the sessions; one that leaves the same behind is decided by the check of the
+matcher where it is in one, else by ESBMC, which proves it equal to the reference for all inputs (equivalent) or refutes it.
+What neither decides is undecided: that is a figure, no fault of the C.
 """
 
 import re
@@ -27,12 +26,10 @@ from rcsc.code.testing.executors.native import COMPILE_S, Native
 from rcsc.code.testing.executors.shim import shim_c
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.executors.targets import ComparedFunction, targets
-from rcsc.code.testing.matchers.matcher import Checked, Compared, check_matcher
-from rcsc.code.testing.matchers.matcher_text import matcher_text, numbers
+from rcsc.code.testing.matcher import Checked, check_matcher
 from rcsc.lang.model import Program, Snapshot
 
 RUN_S = 20.0
-MOST_MASKS = 5000
 SEED = 1984
 FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off")
 
@@ -235,52 +232,6 @@ def _mutants(text: str, lines: int, first: int, last: int) -> Iterator[CodeMutan
             yield CodeMutant(change, function, text, token.start, token.text, new)
 
 
-@dataclass(frozen=True, slots=True)
-class Decider:
-    """The numbers of all masks and class tables, and what the complete check says of others in their place."""
-
-    source: str = field(default="", repr=False)
-    places: Mapping[int, tuple[Compared, int, int]] = field(default_factory=dict)
-    """By offset in the source: the table, the component (-1 for its masks) and the position."""
-
-    def knows(self, mutant: CodeMutant) -> bool:
-        """Whether the mutant is a changed mask or class."""
-        return mutant.change == "mask" and mutant.start in self.places and mutant.base == self.source
-
-    def decides(self, mutant: CodeMutant) -> Noticed | None:
-        """Who notices a changed mask or class; None where the mutant is something else."""
-        value = INTEGER.match(mutant.new)
-        if value is None or not self.knows(mutant):
-            return None
-        compared, component, at = self.places[mutant.start]
-        number = int(value[1], 0)
-        masks = component < 0
-        same = compared.with_word(at, number) if masks else compared.with_class(component, at, number)
-        return Noticed.EQUIVALENT if same else Noticed.MATCHER
-
-
-def decider(
-    program: Program, symbols: Symbols, files: Mapping[str, str], checked: Mapping[str, Checked]
-) -> Decider:
-    """What the complete check of the tables in `checked` knows, by place in the C file.
-
-    A number whose value is not the one that the check read from the compiled C is left out.
-    """
-    source = variants(source_of(symbols, files))[0]
-    places: dict[int, tuple[Compared, int, int]] = {}
-    for table in program.tables:
-        if table.name not in checked or not checked[table.name].tables:
-            continue
-        tables, function = checked[table.name].tables, symbols.lines[table.name]
-        for initializer in numbers(source, function, matcher_text(source, function, symbols.struct)):
-            compared, component = tables[initializer.lookup], initializer.component
-            read = compared.words if component < 0 else [at for at, _ in compared.classes[component]]
-            if list(initializer.values) == read:
-                entries = ((compared, component, at) for at, _ in enumerate(read))
-                places.update(zip(initializer.offsets, entries, strict=True))
-    return Decider(source, places)
-
-
 def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
     """The emitted C file."""
     return next(text for path, text in files.items() if Path(path).name == symbols.source)
@@ -288,7 +239,11 @@ def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
 
 @dataclass(slots=True)
 class Judge:
-    """Decides on mutants of one program's C; the shim is compiled once."""
+    """Decides on mutants of one program's C; the shim is compiled once.
+
+    Attributes:
+        known: By table, inputs that match its lines.
+    """
 
     program: Program
     symbols: Symbols
@@ -297,7 +252,7 @@ class Judge:
     compiler: str
     expected: bytes
     esbmc_s: float
-    decider: Decider
+    known: Mapping[str, Sequence[Snapshot]]
 
     def source(self) -> str:
         """Path of the emitted C among the files."""
@@ -312,13 +267,33 @@ class Judge:
 
     def judge(self, mutant: CodeMutant) -> Noticed:
         """Who notices the mutant."""
-        decided = self.decider.decides(mutant)
-        if decided is Noticed.MATCHER:
-            return decided
+        checked = self.by_check(mutant) if mutant.change == "mask" else Noticed.UNDECIDED
+        if checked is Noticed.MATCHER:
+            return checked
         noticed = self.by_tests(mutant.text)
         if noticed is not Noticed.UNDECIDED:
-            return Noticed.MISSED if decided and noticed is Noticed.TESTS else noticed
-        return decided or self.by_proof(mutant)
+            missed = checked is Noticed.EQUIVALENT and noticed is Noticed.TESTS
+            return Noticed.MISSED if missed else noticed
+        return checked if checked is Noticed.EQUIVALENT else self.by_proof(mutant)
+
+    def by_check(self, mutant: CodeMutant) -> Noticed:
+        """What the check of the matcher says of the tables whose masks the changed function may look at."""
+        files = {**self.files, self.source(): mutant.text}
+        lines = {
+            target.function: target for target in targets(self.program, self.symbols) if target.kind == "line"
+        }
+        asked = [lines[name] for name in first_callers(mutant.text, mutant.function, lines)]
+        said = {self.checked(files, target) for target in asked} or {Noticed.UNDECIDED}
+        return next(each for each in (Noticed.MATCHER, Noticed.UNDECIDED, Noticed.EQUIVALENT) if each in said)
+
+    def checked(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
+        """What the check of one matcher says; undecided where it is not complete."""
+        table = self.program.tables[target.number]
+        checked = check_matcher(self.program, self.symbols, files, table, self.known.get(table.name, ()))
+        if isinstance(checked, tuple):
+            return Noticed.MATCHER
+        complete = isinstance(checked, Checked) and not checked.truths and not checked.unmatched
+        return Noticed.EQUIVALENT if complete else Noticed.UNDECIDED
 
     def by_tests(self, text: str) -> Noticed:
         """Whether the compiler or the tests notice another C file."""
@@ -352,13 +327,8 @@ class Judge:
 
     def shown(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
         """Return the verdict of the matcher's check on a changed function, else ESBMC's."""
-        if target.kind == "line":
-            table = self.program.tables[target.number]
-            checked = check_matcher(self.program, self.symbols, files, table)
-            if isinstance(checked, tuple):
-                return Noticed.MATCHER
-            if isinstance(checked, Checked) and not checked.truths:
-                return Noticed.EQUIVALENT  # complete without the truths of conditions
+        if target.kind == "line" and (said := self.checked(files, target)) is not Noticed.UNDECIDED:
+            return said
         if not self.esbmc_s or too_large(self.program, target):
             return Noticed.UNDECIDED
         answer = prove_function(self.program, self.symbols, files, target, self.esbmc_s).answer
@@ -379,7 +349,7 @@ def portable_agrees(
     native: Native, files: Mapping[str, str], sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
 ) -> bool:
     """Whether the C without compiler built-ins leaves the same behind; see `judge_code`."""
-    with prepared(native, files, sessions, 0.0, Decider()) as judge:
+    with prepared(native, files, sessions, 0.0, {}) as judge:
         other = variants(source_of(native.symbols, files))[1]
         return judge is None or judge.by_tests(other) is Noticed.UNDECIDED
 
@@ -390,7 +360,7 @@ def prepared(
     files: Mapping[str, str],
     sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
     esbmc_s: float,
-    decides: Decider,
+    known: Mapping[str, Sequence[Snapshot]],
 ) -> "Iterator[Judge | None]":
     """A judge with its files in place, which knows what the C as it is leaves behind."""
     compiler, program, symbols = c_compiler(), native.program, native.symbols
@@ -404,59 +374,17 @@ def prepared(
         (place / "in.bin").write_bytes(_rows(native, sessions))
         for name in ("shim", "extra"):
             run_command([compiler, *FLAGS, "-c", "-o", f"{name}.o", f"{name}.c"], place, COMPILE_S)
-        judge = Judge(program, symbols, files, place, compiler, b"", esbmc_s, decides)
+        judge = Judge(program, symbols, files, place, compiler, b"", esbmc_s, known)
         judge.expect(source_of(symbols, files))
         yield judge
-
-
-def judge_masks(
-    symbols: Symbols, files: Mapping[str, str], lines: int, decides: Decider
-) -> list[tuple[CodeMutant, Noticed]]:
-    """Judges mutants of the masks and class tables, by the complete check alone; by sample where there are many.
-
-    Args:
-        symbols: Names in the emitted C.
-        files: The emitted files, text by path.
-        lines: How many lines the largest table has.
-        decides: The check.
-    """
-    every = [m for m in code_mutants(source_of(symbols, files), lines) if decides.knows(m)]
-    if len(every) > MOST_MASKS:
-        every = Random(SEED).sample(every, MOST_MASKS)  # noqa: S311  # a repeatable sample
-    return [(mutant, decides.decides(mutant) or Noticed.UNDECIDED) for mutant in every]
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """Which mutants are run.
-
-    Attributes:
-        others: How many of those that the check of the masks does not know; None for all.
-        equal: Those that the check calls equivalent; as many of them are run to see whether that is so.
-    """
-
-    others: int | None
-    equal: tuple[CodeMutant, ...] = ()
-
-    def of(self, every: Sequence[CodeMutant], decides: Decider) -> list[CodeMutant]:
-        """The mutants to run."""
-        others = [mutant for mutant in every if not decides.knows(mutant)]
-        if self.others is None:
-            return [*others, *self.equal]
-        random = Random(SEED)  # noqa: S311  # a repeatable sample
-        return [
-            code_mutant
-            for group in (others, self.equal)
-            for code_mutant in random.sample(group, min(self.others, len(group)))
-        ]
 
 
 def judge_code(
     native: Native,
     files: Mapping[str, str],
     sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
-    decides: Decider,
-    sample: Sample,
+    known: Mapping[str, Sequence[Snapshot]],
+    most: int | None,
     esbmc_s: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[tuple[CodeMutant, Noticed]]:
@@ -466,15 +394,23 @@ def judge_code(
         native: The program as it is, compiled.
         files: The emitted files, text by path.
         sessions: What is run: number of the function, mode (see `shim`), rows.
-        decides: The check of the masks and class tables.
-        sample: Which mutants.
+        known: By table, inputs that match its lines.
+        most: How many mutants of the masks and class tables, and how many others; None for all.
         esbmc_s: Time limit of ESBMC for one function, in seconds; 0 leaves it out.
         progress: Told which mutant is judged.
     """
     lines = max((len(t.lines) for t in native.program.tables), default=1)
-    mutants = sample.of(list(code_mutants(source_of(native.symbols, files), lines)), decides)
+    every = list(code_mutants(source_of(native.symbols, files), lines))
+    masks = [mutant for mutant in every if mutant.change == "mask"]
+    others = [mutant for mutant in every if mutant.change != "mask"]
+    random = Random(SEED)  # noqa: S311  # a repeatable sample
+    mutants = [
+        mutant
+        for group in (masks, others)
+        for mutant in (group if most is None else random.sample(group, min(most, len(group))))
+    ]
     judged = []
-    with prepared(native, files, sessions, esbmc_s, decides) as judge:
+    with prepared(native, files, sessions, esbmc_s, known) as judge:
         for number, mutant in enumerate(mutants if judge else (), 1):
             progress(f"mutant {number} of {len(mutants)} of the C of {native.program.name}")
             judged.append((mutant, judge.judge(mutant)))  # type: ignore[union-attr]  # there is one

@@ -22,7 +22,6 @@ from rcsc.code.testing.executors.externs import STAND_INS, externs
 from rcsc.code.testing.executors.reference_file import all_lines, monitored, reference_c
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
-from rcsc.code.testing.matchers.matcher_text import ShapeError, function_body
 from rcsc.lang.model import Program, Read, Real, TableByCommand, Value, VariableName, spell
 
 CHECKS = (
@@ -287,10 +286,8 @@ def prove_function(
 def step_parts(symbols: Symbols, files: Mapping[str, str], target: ComparedFunction) -> dict[str, str] | None:
     """The functions that a step runs in turn, read from its text; None if it does anything else."""
     source = next(text for path, text in files.items() if Path(path).name == symbols.source)
-    try:
-        body = function_body(source, f"int32_t {target.function}({symbols.struct} *s)")
-    except ShapeError:
-        return None
+    _, _, after = source.partition(f"\nint32_t {target.function}({symbols.struct} *s)\n{{\n")
+    body, _, _ = after.partition("\n}\n")
     return next((match.groupdict() for form in STEPS if (match := form.fullmatch(body))), None)
 
 

@@ -22,7 +22,8 @@ class TableFigures:
         conditions: Conditions of its lines (of those looked at, in a large table).
         shown: Conditions shown to decide their line on their own.
         impossible: Conditions for which that is shown impossible within ranges and assumptions.
-        cells: Cells of the matcher compared with the table, complete; 0 where it was not done.
+        cells: Cells of the matcher compared with the table; 0 where it was not done.
+        unmatched: Lines whose cells were not compared, as no input was found for them.
         mutants: Mutants of the table by who caught them.
         cortex: The emulated target's answer, or why it was not asked.
     """
@@ -34,6 +35,7 @@ class TableFigures:
     shown: int = 0
     impossible: int = 0
     cells: int = 0
+    unmatched: tuple[str, ...] = ()
     mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
     cortex: CortexRun | str = ""
 
@@ -112,7 +114,8 @@ def _table_text(table: TableFigures) -> Iterator[str]:
         f"{table.impossible} impossible, {open_} not found"
     )
     if table.cells:
-        yield f"    matcher = table: {counted(table.cells, 'cell')} compared, complete"
+        left = f"no input found for {', '.join(table.unmatched)}" if table.unmatched else "complete"
+        yield f"    matcher = table: {counted(table.cells, 'cell')} compared, {left}"
     if isinstance(table.cortex, CortexRun):
         run = table.cortex
         whole = "all " if run.complete else ""

@@ -22,7 +22,7 @@ from rcsc.code.testing.agree import (
     run_sanitized,
     run_session,
 )
-from rcsc.code.testing.code_mutants import Noticed, Sample, decider, judge_code, judge_masks, portable_agrees
+from rcsc.code.testing.code_mutants import Noticed, judge_code, portable_agrees
 from rcsc.code.testing.cortex import MOST_INPUTS, CortexRun, run_cortex
 from rcsc.code.testing.esbmc import EsbmcAnswer, EsbmcVerdict, prove_function, too_large
 from rcsc.code.testing.executors.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
@@ -35,7 +35,7 @@ from rcsc.code.testing.executors.targets import ComparedFunction, is_matcher, ta
 from rcsc.code.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
 from rcsc.code.testing.inputs.snapshot import Solver, search_in
 from rcsc.code.testing.inputs.vectors import Vectors, vectors_of
-from rcsc.code.testing.matchers.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, check_matcher
 from rcsc.code.testing.mutants import Caught, Prover, judge_table
 from rcsc.lang.model import Line, Program, Snapshot, Table
 
@@ -106,18 +106,19 @@ class Suite:
     executors: Executors
     compared: AgreementCount = field(default_factory=AgreementCount)
     diagnostics: list[Diagnostic] = field(default_factory=list)
-    checked: dict[str, Checked] = field(default_factory=dict)
+    known: dict[str, list[Snapshot]] = field(default_factory=dict)
+    """By table, inputs that match its lines."""
 
     def table(self, target: ComparedFunction) -> Table | None:
         """The table of a matcher or step."""
         return None if target.kind in ("cycle", "init") else self.program.tables[target.number]
 
-    def agreement(self, vectors: Mapping[str, Vectors]) -> None:
+    def agreement(self) -> None:
         """Vectors, drawn snapshots and drawn sessions in every executor."""
         for target in self.executors.targets:
             self.options.progress(f"running {target.function}")
             table = self.table(target)
-            snapshots = [] if table is None else [v.snapshot for v in vectors[table.name].vectors]
+            snapshots = [] if table is None else self.known[table.name]
             if target.kind == "init":
                 disagreement = run_init(self.executors, target)
             elif is_matcher(target):
@@ -188,16 +189,13 @@ class Suite:
         self.diagnostics.append(Diagnostic(Code.MATCHER_DIFFERS, message, place, notes=tuple(notes)))
 
     def matcher(self, table: Table) -> Checked | None:
-        """The complete per-variable check of the emitted masks."""
+        """The complete check of the matcher, a group of variables at a time."""
         self.options.progress(f"comparing the masks of table {table.name}")
-        checked = check_matcher(self.program, self.symbols, self.files, table)
+        checked = check_matcher(self.program, self.symbols, self.files, table, self.known[table.name])
         if isinstance(checked, tuple):
             self.differs(f"the C matcher of table `{table.name}` is not the table", table, checked)
             return None
-        if isinstance(checked, Absent):
-            return None
-        self.checked[table.name] = checked
-        return checked
+        return None if isinstance(checked, Absent) else checked
 
     def esbmc(self) -> Iterator[EsbmcVerdict]:
         """ESBMC on every function of a table that is not too large for it."""
@@ -254,27 +252,18 @@ class Suite:
         if not portable_agrees(native, self.files, replays):
             message = f"the C of `{self.program.name}` does something else without compiler built-ins"
             self.differs(message, None, ())
-        decides = decider(self.program, self.symbols, self.files, self.checked)
-        lines = max((len(table.lines) for table in self.program.tables), default=1)
-        masks = judge_masks(self.symbols, self.files, lines, decides)
         options = self.options
-        equal = [mutant for mutant, noticed in masks if noticed is Noticed.EQUIVALENT]
-        rest = judge_code(
-            native,
-            self.files,
-            replays,
-            decides,
-            Sample(options.mutants, tuple(equal)),
-            options.esbmc_s,
-            options.progress,
+        judged = judge_code(
+            native, self.files, replays, self.known, options.mutants, options.esbmc_s, options.progress
         )
-        missed = [mutant for mutant, noticed in rest if noticed is Noticed.MISSED]
+        missed = [mutant for mutant, noticed in judged if noticed is Noticed.MISSED]
         if missed:
             message = f"the check of the masks of `{self.program.name}` calls equal what the tests tell apart"
             self.differs(message, None, [mutant.where for mutant in missed[:MOST_SHOWN]])
-        for name, judged in (("mutants of the masks", masks), ("mutants of the C", rest)):
-            if judged:
-                yield name, tally([noticed.value for _, noticed in judged])
+        for name, masks in (("mutants of the masks", True), ("mutants of the C", False)):
+            noticed_by = [noticed.value for mutant, noticed in judged if (mutant.change == "mask") is masks]
+            if noticed_by:
+                yield name, tally(noticed_by)
 
     def figures(self, number: int, table: Table, vectors: Vectors) -> TableFigures:
         """What is checked table by table."""
@@ -287,6 +276,7 @@ class Suite:
             vectors.shown,
             sum(1 for u in vectors.unshown if u.condition and u.reason != "not found"),
             checked.cells if checked else 0,
+            checked.unmatched if checked else (),
             self.mutants(table),
             self.cortex(number, table),
         )
@@ -296,7 +286,8 @@ class Suite:
         search = search_in(self.program, self.proofs.solver)
         tables = self.program.tables
         vectors = {str(t.name): vectors_of(search, t, _samples(t, self.options)) for t in tables}
-        self.agreement(vectors)
+        self.known = {name: [v.snapshot for v in some.vectors] for name, some in vectors.items()}
+        self.agreement()
         return ProgramFigures(
             self.program.name,
             tuple(self.figures(at, table, vectors[table.name]) for at, table in enumerate(tables)),
