@@ -5,22 +5,20 @@ import io
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from rcsc.code.emit import emitted
+from rcsc.code.emit import emitted, rendering
 from rcsc.code.emit.lower import lower
-from rcsc.code.emit.plan import Plan
+from rcsc.code.emit.plan import Plan, Sort
 from rcsc.driver.compile import planned
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
 from rcsc.front.commands import run
 from rcsc.lang.model import ProvedProgram, seal_of_proof
 from rcsc.proof.solvers.options import Options
-from rcsc.views.trace.c_code import c_names, c_pieces
-from rcsc.views.trace.chunks import chunks
-from rcsc.views.trace.matrix import Known, matrix, untraced
-from rcsc.views.trace.origin import Origin, Sort
+from rcsc.views.trace.matrix import Known, matrix
 from rcsc.views.trace.page import page
 from tests.support.browser import Browser
 from tests.support.programs.examples import EVERYTHING
@@ -101,42 +99,26 @@ def test_code_for_all_of_the_language_is_traced(real: str) -> None:
     assert {piece.origin.sort for piece in one.pieces} >= {*Sort} - {Sort.SYSTEM}
 
 
-def test_code_that_nothing_in_the_tables_stands_for_is_told(door: Path) -> None:
+def test_code_that_nothing_in_the_tables_stands_for_is_told(
+    door: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A template says of each of its lines where it comes from, or the line is told."""
     [plan] = plans(str(door))
-    [(name, text)] = [(name, text) for name, text in emitted(plan).items() if name.endswith(".c")]
-    names = c_names(plan)
-    for foreign in (
-        "int door_more(void)\n{\n    return 1;\n}\n",
-        "/* Says nothing of whose it is. */\nstatic int other;\n",
-        "static void door_unsaid(void)\n{\n}\n",
-        "enum { DOOR_STRANGE = 3 };\n",
-    ):
-        changed = f"{text}\n{foreign}"
-        left = list(untraced({name: changed}, c_pieces(names, name, changed)))
-        first = text.count("\n") + 2
-        assert left[-1] == f"{name}:{first + foreign.count(chr(10)) - 1}"
-        assert all(int(where.rpartition(":")[2]) >= first for where in left)
-    said = "/* A helper that says what it serves. */\nstatic inline void door_said(void)\n{\n}\n"
-    assert not list(untraced({name: text + said}, c_pieces(names, name, text + said)))
+    templates = rendering.environment()
+    assert templates.loader is not None
+    given = templates.loader.get_source
 
+    def planted(*asked: Any) -> Any:
+        text, *more = given(*asked)
+        before = "{% for function in publics %}"
+        return (text.replace(before, f"int other;\n\n{before}"), *more)
 
-def test_a_case_whose_label_is_gone_leaves_its_line_without_code(door: Path) -> None:
-    [plan] = plans(str(door))
-    [(name, text)] = [(name, text) for name, text in emitted(plan).items() if name.endswith(".c")]
-    case = Origin(Sort.LINE, "press_once", "wait")
-    assert [piece for piece in c_pieces(c_names(plan), name, text) if piece.origin == case]
-    without = text.replace("case DOOR_LINE_PRESS_ONCE_WAIT:", "case 1:")
-    assert not [piece for piece in c_pieces(c_names(plan), name, without) if piece.origin == case]
-
-
-def test_chunks_leave_out_blank_lines_alone(door: Path) -> None:
-    [plan] = plans(str(door))
-    for name, text in emitted(plan).items():
-        if name.endswith((".c", ".h")):
-            inside = [at for chunk in chunks(text) for at in range(chunk.first, chunk.last + 1)]
-            assert len(inside) == len(set(inside))
-            filled = {at for at, line in enumerate(text.splitlines(), 1) if line.strip()}
-            assert filled <= set(inside)
+    monkeypatch.setattr(templates, "cache", None)
+    monkeypatch.setattr(templates.loader, "get_source", planted)
+    files = emitted(plan)
+    left = [where.rpartition(":") for where in matrix(plan, files, Known({})).untraced]
+    assert [name for name, _, _ in left] == ["c/door.h", "c/door.c"]
+    assert {files[name].splitlines()[int(at) - 1] for name, _, at in left} == {"int other;"}
 
 
 def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(door: Path) -> None:

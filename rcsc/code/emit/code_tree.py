@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar, TypeAlias, assert_never
 
+from rcsc.code.emit.plan import Origin
 from rcsc.lang.model import I64_MAX, I64_MIN, Value
 from rcsc.lang.operator_table import spell_single
 
@@ -199,12 +200,19 @@ class Function:
 
     Attributes:
         inline: Whether C puts it where it is called: for one that a step calls at one place, its call costs more than it.
+        origin: Where it comes from; None for one that serves others, which is told by what is said of it.
     """
 
     doc: str
     head: str
     body: Body
     inline: bool = False
+    origin: Origin | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.head.partition("(")[0].rpartition(" ")[2]
 
 
 def infix(op: str, *operands: Code) -> Code:

@@ -7,6 +7,7 @@ several leaves together), and the class's mask has a bit for each line that it d
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from math import prod
 from typing import TypeAlias
 
@@ -209,6 +210,11 @@ class PlanTable:
     stops: tuple[int, ...] = ()
 
     @property
+    def origin(self) -> "Origin":
+        """Where code of the whole table comes from."""
+        return Origin(Sort.TABLE, self.table.name)
+
+    @property
     def where(self) -> str:
         """The assumptions that must hold where the table is matched by itself, in words; empty for none."""
         names = " and ".join(self.table.stops)
@@ -257,3 +263,52 @@ class Plan:
     def mark(self) -> str:
         """The mark of code that is not proved; empty for proved code."""
         return "" if self.proved else UNPROVED
+
+
+# --- where code comes from ---
+
+
+class Sort(StrEnum):
+    """What an origin is."""
+
+    LINE = "line"
+    TABLE = "table"
+    PROCEDURE = "procedure"
+    ASSUMPTION = "assumption"
+    INVARIANT = "invariant"
+    VARIABLE = "variable"
+    TYPE = "type"
+    LEVEL = "level"
+    SYSTEM = "system"
+    PROGRAM = "program"  # all variables of a program: their initial values, their ranges
+    INFRASTRUCTURE = "infrastructure"
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a piece of generated code comes from.
+
+    Attributes:
+        name: Of a line or a table the table; of infrastructure its reason; else the declaration.
+        line: The line's name; empty for all else.
+    """
+
+    sort: Sort
+    name: str
+    line: str = ""
+
+    @property
+    def words(self) -> str:
+        """The origin as a person says it.
+
+        >>> Origin(Sort.LINE, "acquire", "3").words, Origin(Sort.PROCEDURE, "look").words
+        ('acquire line 3', 'procedure look')
+        """
+        if self.sort is Sort.LINE:
+            return f"{self.name} line {self.line}"
+        return f"{self.sort} {self.name}" if self.sort is not Sort.INFRASTRUCTURE else self.name
+
+
+def infrastructure(reason: str) -> Origin:
+    """Give the origin of what serves no line, with the reason why it is there."""
+    return Origin(Sort.INFRASTRUCTURE, reason)

@@ -82,7 +82,7 @@ MOST_GROUPED = 512
 def emit_python(plan: Plan) -> dict[str, str]:
     """Return the Python module of the plan, by path below the generated folder."""
     maker = _Maker(plan)
-    return {f"python/{maker.names.program}.py": render("module.py.jinja", maker.view())}
+    return {f"python/{maker.names.program}.py": render("module.py.jinja", maker.view()).text}
 
 
 class _Maker:

@@ -1,20 +1,78 @@
-"""The templates, and C in lines of at most 110 columns; the only importer of Jinja2."""
+"""The templates, C in lines of at most 110 columns, and where each of them comes from; the only importer of Jinja2.
 
+A template, or code in it, says by marks where lines come from: a line with `mark` before them, and `END` after. Marks are no lines of
+the file.
+"""
+
+import json
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 
 import jinja2
 
-from rcsc.code.emit.code_tree import IN_C, IN_PYTHON
+from rcsc.code.emit.code_tree import IN_C, IN_PYTHON, Function
+from rcsc.code.emit.plan import Origin, Sort, infrastructure
 
 WIDTH = 110
 STEP = "    "
 COMMENT = re.compile(r"(?P<pad> *)(?P<code>.*?) ?/\* (?P<words>.*) \*/")
 BREAK = re.compile(r"(?:&&|\|\||[<>!=]=|[<>?:&|+,]) ")
 """What a line of C may end with."""
+END = "\x01"
+"""A line that ends what the last mark begins; it is no line of the file."""
+DIRECTIVES = (
+    ("#include", "declares what the file uses"),
+    ("#pragma", "has reals rounded one operation at a time, as they were proved"),
+    ("#", "chooses by the compiler, or guards against including twice"),
+    ('extern "C" {', "lets C++ call it"),
+    ("}", "lets C++ call it"),
+)
+"""What lines outside of marks are for, by how they begin."""
+SAID = "says what the file is"
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Lines of a generated file that have one origin.
+
+    Attributes:
+        file: Below the generated folder.
+        first, last: Numbers of its lines, from 1, both included.
+        name: What it is called there: a function, a constant, a member; empty for what has no name.
+    """
+
+    file: str
+    first: int
+    last: int
+    name: str
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
+class Rendered:
+    """A file, and where its lines come from; only of C."""
+
+    text: str
+    pieces: tuple[Piece, ...] = ()
+
+
+def mark(name: str, origin: Origin, *, around: bool = False) -> str:
+    """A line before those that come from somewhere.
+
+    Args:
+        name: What they are called there.
+        origin: Where they come from.
+        around: Whether what is marked inside is left out; else it is told once more.
+    """
+    return END + json.dumps([name, origin.sort, origin.name, origin.line, around])
+
+
+def _mark_of(function: Function) -> str:
+    return mark(function.name, function.origin or infrastructure(function.doc))
 
 
 @cache
@@ -28,17 +86,90 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701 - the output is C and Python, not HTML
     )
-    templates.filters |= {"c": IN_C.lines, "python": IN_PYTHON.lines}
+    templates.filters |= {"c": IN_C.lines, "python": IN_PYTHON.lines, "begins": _mark_of}
+    templates.globals |= {"begins": mark, "ends": END, "infrastructure": infrastructure}
     return templates
 
 
-def render(template: str, view: Mapping[str, object]) -> str:
-    """Lay out the template with these values."""
+def render(template: str, view: Mapping[str, object], file: str = "") -> Rendered:
+    """The template laid out with these values.
+
+    Args:
+        template: Its name.
+        view: The values.
+        file: What it makes, below the generated folder.
+    """
     text = environment().get_template(template).render(view)
     if not template.endswith((".c.jinja", ".h.jinja")):
-        return text
+        return Rendered(text)
     first, *others = text.splitlines()  # the first says of which program the file is: it is read again
-    return "\n".join([first, *(line for long in others for line in folded(long)), ""])
+    reading = _Reading(file)
+    for line in (first, *(line for long in others for line in folded(long))):
+        reading.take(line)
+    return Rendered("\n".join([*reading.lines, ""]), tuple(reading.pieces))
+
+
+@dataclass(slots=True)
+class _Open:
+    """A mark that did not end yet: its line, what is said of it, the pieces inside."""
+
+    first: int
+    said: Sequence[str]
+    inside: list[Piece] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Reading:
+    """Takes lines one by one, and keeps where they come from.
+
+    Attributes:
+        begun: The first line of a comment outside of marks whose reason is still to come; 0 for none.
+    """
+
+    file: str
+    lines: list[str] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)
+    marks: list[_Open] = field(default_factory=list)
+    begun: int = 0
+    comment: bool = False
+
+    def take(self, line: str) -> None:
+        """A line of the file, or a mark."""
+        word = line.lstrip()
+        if word == END:
+            self._end()
+        elif word.startswith(END):
+            self.marks.append(_Open(len(self.lines) + 1, json.loads(word.removeprefix(END))))
+        else:
+            self.lines.append(line)
+            if not self.marks:
+                self._outside(line, len(self.lines))
+
+    def _end(self) -> None:
+        """The pieces of the last mark, those inside after it; they belong to the mark around it, where there is one."""
+        mark, last = self.marks.pop(), len(self.lines)
+        name, sort, of, line, around = mark.said
+        spans = [(mark.first, last)]
+        if around and mark.inside:
+            spans = [(mark.first, mark.inside[0].first - 1), (mark.inside[-1].last + 1, last)]
+        origin = Origin(Sort(sort), of, line)
+        own = [Piece(self.file, first, end, name, origin) for first, end in spans]
+        (self.marks[-1].inside if self.marks else self.pieces).extend((*own, *mark.inside))
+
+    def _outside(self, line: str, at: int) -> None:
+        """A line that no mark is around: a comment, a directive, a frame for C++; nobody knows what another is for."""
+        told = self.comment or line.startswith("/*")
+        reason = next((reason for begin, reason in DIRECTIVES if line.startswith(begin)), "")
+        if told:
+            self.begun, self.comment = self.begun or at, not line.endswith("*/")
+        elif reason:
+            self._told(at, reason)
+        elif not line and self.begun:
+            self._told(at - 1, SAID)
+
+    def _told(self, last: int, reason: str) -> None:
+        self.pieces.append(Piece(self.file, self.begun or last, last, "", infrastructure(reason)))
+        self.begun = 0
 
 
 def folded(line: str) -> Iterator[str]:
@@ -50,7 +181,7 @@ def folded(line: str) -> Iterator[str]:
     >>> list(folded("    x = " + " + ".join(["a_quite_long_name"] * 7) + ";"))[1]
     '            a_quite_long_name;'
     """
-    if len(line) <= WIDTH or line.startswith("#"):
+    if len(line) <= WIDTH or line.startswith("#") or END in line:
         yield line
     elif (parts := COMMENT.fullmatch(line)) is not None:
         yield from _comment(parts["words"], parts["pad"])

@@ -28,7 +28,8 @@ from rcsc.code.emit.code_tree import (
     when,
 )
 from rcsc.code.emit.identifiers import TRACE, comment, constant_word, guard
-from rcsc.code.emit.rendering import render
+from rcsc.code.emit.plan import Origin, Sort
+from rcsc.code.emit.rendering import Piece, Rendered, render
 from rcsc.code.emit.translate import constant
 from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
 from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Standing, Start, adoption
@@ -43,6 +44,15 @@ TICKS, FIRST = Name(f"s->{TICK}"), Constant(0, "uint64_t")
 
 def emit_system(system: Linked) -> dict[str, str]:
     """Return the files of a system, by path below the generated folder."""
+    return {file: rendered.text for file, rendered in _rendered(system).items()}
+
+
+def system_map(system: Linked) -> dict[str, tuple[Piece, ...]]:
+    """Return for each of the files where its lines come from: from the system's description, but for what is for the compiler."""
+    return {file: rendered.pieces for file, rendered in _rendered(system).items()}
+
+
+def _rendered(system: Linked) -> dict[str, Rendered]:
     maker = _Maker(system)
     view = maker.view()
     forms = {
@@ -51,7 +61,9 @@ def emit_system(system: Linked) -> dict[str, str]:
         "cmake": "system.cmake.jinja",
         "pc": "system.pc.jinja",
     }
-    return {f"c/{system.word}.{end}": render(form, view) for end, form in forms.items()}
+    return {
+        file: render(form, view, file) for end, form in forms.items() for file in (f"c/{system.word}.{end}",)
+    }
 
 
 def outward(system: Linked) -> Iterator[tuple[str, str]]:
@@ -70,6 +82,7 @@ class _Maker:
     def __init__(self, system: Linked) -> None:
         self.system = system
         self.word = system.word
+        self.origin = Origin(Sort.SYSTEM, system.word)
 
     def view(self) -> dict[str, object]:
         """What the templates lay out."""
@@ -78,6 +91,7 @@ class _Maker:
         return {
             "source": comment(self.system.source),
             "word": self.word,
+            "origin": self.origin,
             "guard": guard(self.word),
             "includes": [f"{program}.h" for program in programs],
             "tick": f"{constant_word(self.word, 'tick', 'ms')} = {self.system.tick_ms}",
@@ -130,16 +144,16 @@ class _Maker:
         doc = "The whole system in one block: copying it is copying everything that a step depends on."
         yield doc, f"{self.word}_t", members
 
-    def _questions(self) -> Iterator[tuple[str, str]]:
-        """What each function of the user's fills, and its prototype."""
+    def _questions(self) -> Iterator[tuple[str, str, str]]:
+        """What each function of the user's fills, its name, and its prototype."""
         every = [(level, question) for level in self.system.levels for question in level.questions]
-        for head in dict.fromkeys(question.head for _, question in every):
+        for name, head in dict.fromkeys((question.function, question.head) for _, question in every):
             fills = (
                 f"{level.name}.{question.into.variable} of {', '.join(key.variable for key in question.keys)}"
                 for level, question in every
                 if question.head == head
             )
-            yield comment("; ".join(fills)), head
+            yield comment("; ".join(fills)), name, head
 
     def _members(self, side: str, party: str) -> Fields:
         buffers = (b for b in self.system.buffers if (b.side, b.party) == (side, party))
@@ -150,7 +164,8 @@ class _Maker:
     def _function(
         self, doc: str, name: str, body: Iterable[Stmt], gives: str = "void", more: str = ""
     ) -> Function:
-        return Function(doc, f"{gives} {self.word}_{name}({self.word}_t *s{more})", tuple(body))
+        head = f"{gives} {self.word}_{name}({self.word}_t *s{more})"
+        return Function(doc, head, tuple(body), origin=self.origin)
 
     def _own(self, name: str, level: LinkedLevel) -> Do:
         return Do(Invoke(f"{self.word}_{name}_{level.member}", (Name("s"),)))

@@ -7,8 +7,9 @@ nothing where nobody knows it.
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from rcsc.code.emit.plan import Origin, Sort
+from rcsc.code.emit.rendering import Piece
 from rcsc.views.trace.matrix import Declared, Matrix, Tests, TracedLine
-from rcsc.views.trace.origin import Origin, Piece, Sort
 from rcsc.views.trace.requirements import places
 from rcsc.views.trace.tables_of import ranges
 

@@ -122,7 +122,7 @@ def _of_system(project: Proved, path: Path) -> Matrix:
     before = set(generated.files)
     generated.add_system(path)
     own = {name: text for name, text in generated.files.items() if name not in before}
-    return of_system(generated.systems[path].word, str(path), own)
+    return of_system(generated.systems[path], str(path), own)
 
 
 def _untraced(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:

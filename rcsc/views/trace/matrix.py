@@ -8,7 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.base.diagnostics.source import Source, Span
-from rcsc.code.emit.plan import Plan, PlanLine, PlanTable
+from rcsc.code.emit import source_map
+from rcsc.code.emit.plan import Origin, Plan, PlanLine, PlanTable, Sort
+from rcsc.code.emit.rendering import Piece
 from rcsc.code.testing.coverage.document import VectorSet
 from rcsc.code.testing.coverage.lines import TakenLine, taken
 from rcsc.code.testing.inputs.condition_text import words
@@ -26,8 +28,7 @@ from rcsc.lang.model import (
     Property,
     Statement,
 )
-from rcsc.views.trace.c_code import c_names, c_pieces, system_pieces
-from rcsc.views.trace.origin import Origin, Piece, Sort
+from rcsc.run.link import Linked, system_map
 from rcsc.views.trace.python_code import python_pieces
 
 OWES_NOTHING = "proved: it owes nothing"
@@ -220,10 +221,11 @@ def matrix(plan: Plan, files: Mapping[str, str], known: Known) -> Matrix:
     )
 
 
-def of_system(name: str, source: str, files: Mapping[str, str]) -> Matrix:
+def of_system(system: Linked, source: str, files: Mapping[str, str]) -> Matrix:
     """Build the matrix of the C of a whole system, all of which comes from its description."""
+    name, maps = system.word, system_map(system)
     code = {path: text for path, text in files.items() if path.endswith((".c", ".h"))}
-    pieces = tuple(piece for path, text in code.items() for piece in system_pieces(name, path, text))
+    pieces = tuple(piece for path in code for piece in maps[path])
     hashed = _hashed(files)
     return Matrix(name, source, digest(*sorted(hashed.values())), hashed, {}, (), (), {}, pieces, tuple(untraced(code, pieces)),
         {(Sort.SYSTEM, name): source})  # fmt: skip
@@ -234,12 +236,9 @@ def _hashed(files: Mapping[str, str]) -> dict[str, str]:
 
 
 def _pieces(plan: Plan, code: Mapping[str, str]) -> Iterator[Piece]:
-    names = c_names(plan)
+    maps = source_map(plan)
     for path, text in code.items():
-        if path.endswith(".py"):
-            yield from python_pieces(plan, path, text)
-        else:
-            yield from c_pieces(names, path, text)
+        yield from python_pieces(plan, path, text) if path.endswith(".py") else maps[path]
 
 
 def untraced(code: Mapping[str, str], pieces: Iterable[Piece]) -> Iterator[str]:

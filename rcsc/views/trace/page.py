@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby
 
+from rcsc.code.emit.plan import Origin, Sort
+from rcsc.code.emit.rendering import Piece
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
-from rcsc.views.trace.origin import Origin, Piece, Sort
 from rcsc.views.trace.requirements import places
 from rcsc.views.trace.tables_of import spots
 

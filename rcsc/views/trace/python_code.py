@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from rcsc.code.emit.identifiers import comment, names_in
-from rcsc.code.emit.plan import Plan
-from rcsc.views.trace.origin import Origin, Piece, Sort, infrastructure
+from rcsc.code.emit.plan import Origin, Plan, Sort, infrastructure
+from rcsc.code.emit.rendering import Piece
 
 _IMPORTS = "the standard library"
 _SAID = "says what the file is"

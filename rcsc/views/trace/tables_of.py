@@ -5,8 +5,8 @@ from typing import Any
 
 from rcsc import __version__
 from rcsc.base.host.files import csv_text
+from rcsc.code.emit.rendering import Piece
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
-from rcsc.views.trace.origin import Piece
 from rcsc.views.trace.requirements import places
 
 FORM = 2

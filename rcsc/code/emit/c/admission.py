@@ -165,7 +165,7 @@ def check_function(c: CProgram) -> Function:
         *first_of(asked),
         Leave(AT),
     )
-    return Function(doc, f"int32_t {c.p}_check(const {c.p}_t *s)", body)
+    return Function(doc, f"int32_t {c.p}_check(const {c.p}_t *s)", body, origin=c.origin)
 
 
 def _unfit(c: CProgram, variable: Variable) -> Code | None:

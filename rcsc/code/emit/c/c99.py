@@ -15,6 +15,7 @@ from rcsc.code.emit.c.cycle import (
     step_functions,
 )
 from rcsc.code.emit.c.declarations import (
+    TRACED,
     externs,
     fields,
     layout_condition,
@@ -31,9 +32,9 @@ from rcsc.code.emit.c.procedures import callees_first, failing, procedure_functi
 from rcsc.code.emit.c.symbols import symbols
 from rcsc.code.emit.code_tree import Invoke, read
 from rcsc.code.emit.identifiers import comment, failed_type, guard, names_in, types_header
-from rcsc.code.emit.plan import Plan
+from rcsc.code.emit.plan import Plan, infrastructure
 from rcsc.code.emit.ranges import at_procedures
-from rcsc.code.emit.rendering import render
+from rcsc.code.emit.rendering import Piece, Rendered, render
 
 
 def _view(c: CProgram) -> dict[str, object]:
@@ -56,6 +57,8 @@ def _view(c: CProgram) -> dict[str, object]:
     return {
         "plan": c.plan,
         "program": c.p,
+        "whole": c.origin,
+        "traced": infrastructure(TRACED),
         "guard": guard(c.p),
         "source": comment(c.plan.source),
         "includes": sorted({types_header(unit) for unit in c.names.units.values()}),
@@ -80,14 +83,24 @@ def _view(c: CProgram) -> dict[str, object]:
 
 
 def emit_c(plan: Plan) -> dict[str, str]:
-    """Return the C files of the plan, by path below the generated folder."""
+    """The C files of the plan, by path below the generated folder."""
+    return {file: rendered.text for file, rendered in _rendered(plan).items()}
+
+
+def source_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
+    """For each of the C files where its lines come from."""
+    return {file: rendered.pieces for file, rendered in _rendered(plan).items()}
+
+
+def _rendered(plan: Plan) -> dict[str, Rendered]:
     c = _program(plan)
     view, name = _view(c), c.p
+    header, source = f"c/{name}.h", f"c/{name}.c"
     return {
         **type_headers(c),
-        f"c/{name}.h": render("header.h.jinja", view),
-        f"c/{name}.c": render("source.c.jinja", view),
-        f"c/{c.names.file}.json": symbols(plan, c.names, c.digest),
+        header: render("header.h.jinja", view, header),
+        source: render("source.c.jinja", view, source),
+        f"c/{c.names.file}.json": Rendered(symbols(plan, c.names, c.digest)),
         f"c/{name}.cmake": render("target.cmake.jinja", view),
         f"c/{name}.pc": render("package.pc.jinja", view),
     }

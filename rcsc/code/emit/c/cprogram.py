@@ -26,7 +26,7 @@ from rcsc.code.emit.code_tree import (
     when,
 )
 from rcsc.code.emit.identifiers import Names
-from rcsc.code.emit.plan import Plan
+from rcsc.code.emit.plan import Origin, Plan, Sort
 from rcsc.code.emit.ranges import Ranges
 from rcsc.code.emit.translate import STATE
 from rcsc.lang import model
@@ -67,6 +67,11 @@ class CProgram:
         return self.plan.program
 
     @property
+    def origin(self) -> Origin:
+        """Where code of all variables of the program comes from."""
+        return Origin(Sort.PROGRAM, self.program.name)
+
+    @property
     def p(self) -> str:
         """The prefix of its C names."""
         return self.names.program
@@ -77,9 +82,11 @@ class CProgram:
         return len(self.program.variables) + len(self.program.invariants)
 
 
-def on_state(c: CProgram, doc: str, name: str, *body: Stmt, gives: str = "void") -> Function:
-    """Return a function that takes the state."""
-    return Function(doc, f"{gives} {c.p}_{name}({c.p}_t *s)", body)
+def on_state(
+    c: CProgram, doc: str, name: str, *body: Stmt, gives: str = "void", origin: Origin | None = None
+) -> Function:
+    """A function of the state; of all of the program where no other origin is given."""
+    return Function(doc, f"{gives} {c.p}_{name}({c.p}_t *s)", body, origin=origin or c.origin)
 
 
 def run_on_state(c: CProgram, name: str) -> Do:

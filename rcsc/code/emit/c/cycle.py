@@ -39,8 +39,9 @@ from rcsc.code.emit.code_tree import (
     when,
 )
 from rcsc.code.emit.identifiers import DIGEST, FAILED_BITS, comment, failed_type
-from rcsc.code.emit.plan import PlanTable, answering
+from rcsc.code.emit.plan import Origin, PlanTable, Sort, answering
 from rcsc.code.emit.ranges import at_line
+from rcsc.code.emit.rendering import END, mark
 from rcsc.code.emit.translate import FAULT, FAULT_AT, LINE, STATE
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -81,7 +82,7 @@ def action_functions(c: CProgram) -> Iterator[Function]:
         run = (when(c.text.faultless, *matched),) if table.stops else matched
         answers = comment(answering(table.table.requirements))
         doc = f"Matches table {table.table.name} and runs the line; returns the fault, 0 for none.{answers}"
-        yield on_state(c, doc, f"run_{name}", *told, *run, Leave(FAULT), gives="int32_t")
+        yield on_state(c, doc, f"run_{name}", *told, *run, Leave(FAULT), gives="int32_t", origin=table.origin)
 
 
 def assumption_functions(c: CProgram) -> Iterator[Function]:
@@ -94,7 +95,8 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
         doc = comment(f"{words}: {assumption.doc}" if assumption.doc else words)
         body: Body = (Leave(c.text.expr(assumption.condition)),)
         unread = () if touches_state(body) else (discarded(STATE),)
-        yield Function(doc, f"bool {name}(const {c.p}_t *s)", (*unread, *body), inline=True)
+        head, origin = f"bool {name}(const {c.p}_t *s)", Origin(Sort.ASSUMPTION, assumption.name)
+        yield Function(doc, head, (*unread, *body), inline=True, origin=origin)
 
 
 def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
@@ -122,7 +124,9 @@ def _matched(c: CProgram, table: PlanTable, name: str) -> Body:
         head = (
             f"case {line_name}: /* {comment(line.told if len(table.lines) <= MOST_TOLD else line.place)} */",
         )
-        cases.append(Frame(head, (*_kept(c, table, number), *body, Line("break;"))))
+        origin = Origin(Sort.LINE, table.table.name, line.name)
+        case = Frame(head, (*_kept(c, table, number), *body, Line("break;")))
+        cases += [Line(mark(f"case {line_name}", origin)), case, Line(END)]
     none, several = (Set(FAULT, fault_name(c, fault)) for fault in (Fault.NO_LINE, Fault.SEVERAL_LINES))
     unmatched = Frame(("case ", Round(NONE), ":"), (none, Line("break;")))
     return (
@@ -145,11 +149,11 @@ def _begin(c: CProgram) -> Do:
     return run_on_state(c, "begin" if c.plan.defensive else "admit")
 
 
-def _cycle(c: CProgram, doc: str, name: str, *body: Stmt) -> Function:
-    """Return the frame of every cycle, and of a step where outputs have safe values."""
+def _cycle(c: CProgram, doc: str, name: str, origin: Origin, *body: Stmt) -> Function:
+    """The frame of every cycle, and of a step where outputs have safe values."""
     safe = (when(c.text.faulted, run_on_state(c, "safe")),) if _shows_safe(c) else ()
     run = when(c.text.faultless, *body)
-    return on_state(c, doc, name, _begin(c), run, *safe, Leave(FAULT), gives="int32_t")
+    return on_state(c, doc, name, _begin(c), run, *safe, Leave(FAULT), gives="int32_t", origin=origin)
 
 
 def _shows_safe(c: CProgram) -> bool:
@@ -162,10 +166,11 @@ def step_functions(c: CProgram) -> Iterator[Function]:
         name = c.names.tables[table.table.name]
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
         if _shows_safe(c):
-            yield _cycle(c, doc, f"{name}_step", _table_run(c, table.table.name))
+            yield _cycle(c, doc, f"{name}_step", table.origin, _table_run(c, table.table.name))
         else:  # nothing is left to do after the line: compilers jump there, and do not come back
             last = Choice(c.text.faultless, Invoke(f"{c.p}_run_{name}", (STATE,)), FAULT)
-            yield on_state(c, doc, f"{name}_step", _begin(c), Leave(last), gives="int32_t")
+            body = _begin(c), Leave(last)
+            yield on_state(c, doc, f"{name}_step", *body, gives="int32_t", origin=table.origin)
 
 
 def cycle_function(c: CProgram, level: model.Level) -> Function:
@@ -179,7 +184,8 @@ def cycle_function(c: CProgram, level: model.Level) -> Function:
     doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none.{_order(c, level)}"
     name = f"{c.names.levels[level.name]}_cycle"
     last = True, tuple(_chosen(c, level.tables, lambda table: (_table_run(c, table),), "chosen"))
-    return _cycle(c, doc, name, *_while_faultless(c, (*before, *stages, last, *after)))
+    origin = Origin(Sort.LEVEL, level.name)
+    return _cycle(c, doc, name, origin, *_while_faultless(c, (*before, *stages, last, *after)))
 
 
 def _called(c: CProgram, procedure: str) -> tuple[bool, Body]:

@@ -1,20 +1,34 @@
 """What others see of a program's C: types, constants, the state, and the functions that the user writes."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.code.emit.c.cprogram import CProgram
 from rcsc.code.emit.c.ctext import c_type, declared, wide_type
 from rcsc.code.emit.c.layout import record_size, sizes
 from rcsc.code.emit.identifiers import DIGEST, comment, parameter_word, types_guard, types_header
-from rcsc.code.emit.plan import table_position
-from rcsc.code.emit.rendering import render
+from rcsc.code.emit.plan import Origin, Sort, infrastructure, table_position
+from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.scope import c_scope
 from rcsc.lang import model
 from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell, unit_text
 
-Fields: TypeAlias = tuple[tuple[str, str], ...]
-"""Members of a struct, or constants of an enumeration: the declaration of each, and its doc."""
+TRACED = "tells what a cycle did"
+NUMBERED = "numbers what a cycle tells by its position"
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A member of a struct, or a constant of an enumeration."""
+
+    declaration: str
+    doc: str
+    name: str
+    origin: Origin
+
+
+Fields: TypeAlias = tuple[Member, ...]
 FAULT_DOCS = (
     "",
     "an input was refused: `fault_at` is its position",
@@ -27,8 +41,8 @@ FAULT_DOCS = (
 )
 
 
-def type_headers(c: CProgram) -> dict[str, str]:
-    """Return a header for each file that declares types: all programs that use the file share it."""
+def type_headers(c: CProgram) -> dict[str, Rendered]:
+    """A header for each file that declares types: all programs that use it share them."""
     headers = {}
     for unit in dict.fromkeys(c.names.units.values()):
         files = [file for file, word in c.names.units.items() if word == unit]
@@ -43,7 +57,8 @@ def type_headers(c: CProgram) -> dict[str, str]:
             "enums": [_enum(c, enum) for enum in enums],
             "structs": [_record(c, record) for record in records],
         }
-        headers[f"c/{types_header(unit)}"] = render("types.h.jinja", view)
+        file = f"c/{types_header(unit)}"
+        headers[file] = render("types.h.jinja", view, file)
     return headers
 
 
@@ -73,26 +88,27 @@ def _parts(record: model.Record) -> Iterator[Enum | model.Record]:
             yield kind
 
 
-def _enum(c: CProgram, enum: Enum) -> tuple[str, str, str, Fields]:
-    return (
-        c.names.types[enum.name],
-        c_type(enum),
-        comment(enum.name),
-        _numbered(c.names.constants[enum.name], enum.members),
-    )
+def _enum(c: CProgram, enum: Enum) -> tuple[str, str, str, Fields, Origin]:
+    origin = Origin(Sort.TYPE, enum.name)
+    names = c.names.constants[enum.name]
+    members = _numbered(names, enum.members, [origin] * len(names))
+    return c.names.types[enum.name], c_type(enum), comment(enum.name), members, origin
 
 
-def _numbered(names: Iterable[str], docs: Iterable[str]) -> Fields:
-    """Return constants numbered from 0."""
-    pairs = zip(names, docs, strict=True)
-    return tuple((f"{name} = {at}", comment(doc)) for at, (name, doc) in enumerate(pairs))
+def _numbered(names: Iterable[str], docs: Iterable[str], origins: Iterable[Origin]) -> Fields:
+    """Constants from 0 on."""
+    rows = enumerate(zip(names, docs, origins, strict=True))
+    return tuple(Member(f"{name} = {at}", comment(doc), name, origin) for at, (name, doc, origin) in rows)
 
 
-def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
+def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields, Origin]:
+    origin = Origin(Sort.TYPE, record.name)
     names = c.names.members[record.name]
     docs = ("; ".join(word for word in (range_text(f.type), comment(f.doc)) if word) for f in record.fields)
     fields = tuple(
-        (declared(c.names, names[f.name], f.type, defensive=c.plan.defensive), doc)
+        Member(
+            declared(c.names, names[f.name], f.type, defensive=c.plan.defensive), doc, names[f.name], origin
+        )
         for f, doc in zip(record.fields, docs, strict=True)
     )
     size = record_size(record)
@@ -100,11 +116,19 @@ def _record(c: CProgram, record: model.Record) -> tuple[str, str, Fields]:
         c.names.types[record.name],
         f"record {comment(record.name)}, {size} byte{'s' if size > 1 else ''}",
         fields,
+        origin,
     )
 
 
-def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
-    """Yield the constants for positions in the trace, each kind with a comment."""
+def positions(c: CProgram) -> Iterator[tuple[str, Fields, Origin]]:
+    """Constants for what the trace tells by its position, each kind with what is said of it, and where it comes from."""
+    for doc, members in _positions(c):
+        kinds = {(member.origin.sort, member.origin.name) for member in members}
+        sort, name = kinds.pop() if len(kinds) == 1 else (Sort.INFRASTRUCTURE, NUMBERED)
+        yield doc, members, Origin(Sort.TABLE if sort is Sort.LINE else sort, name)
+
+
+def _positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
     for table in c.plan.tables:
         names = c.names.lines[table.table.name]
         docs = (  # where the constant does not say it
@@ -112,31 +136,50 @@ def positions(c: CProgram) -> Iterator[tuple[str, Fields]]:
             for name, line in zip(names, table.lines, strict=True)
         )
         doc = f"`line`, where table {table.table.name} ran; -1 for none"
-        yield comment(doc), _numbered(names, docs)
+        origins = [Origin(Sort.LINE, table.table.name, line.name) for line in table.lines]
+        yield comment(doc), _numbered(names, docs, origins)
     if c.names.assumptions:
         doc = "Bits of `assumptions_failed`, from the lowest, and `fault_at` where an assumption failed"
-        yield doc, _numbered(c.names.assumptions, c.plan.checked)
-    positions = (f"{name} = {at}" for at, name in enumerate((*c.names.leaves.values(), *c.names.invariants)))
+        named = (c.program.assumptions[at].name for at in c.plan.monitored)
+        origins = [Origin(Sort.ASSUMPTION, name) for name in named]
+        yield doc, _numbered(c.names.assumptions, c.plan.checked, origins)
+    origins = [Origin(Sort.VARIABLE, _declared_name(c, leaf)) for leaf in c.names.leaves]
+    origins += [Origin(Sort.INVARIANT, invariant.name) for invariant in c.program.invariants]
     doc = "`fault_at` where an input or a result was refused, and what `check` gives: variables, then invariants"
-    yield doc, tuple((position, "") for position in positions)
+    yield doc, _numbered((*c.names.leaves.values(), *c.names.invariants), [""] * len(origins), origins)
     ok, foreign = c.names.checks
-    checks = (
-        (f"{ok} = -1", "the state may be gone on from"),
+    doc = "What else `check` gives"
+    older = f"its `{DIGEST}` is not {c.names.digest}: other tables made it, or an older version of these"
+    origin = infrastructure(f"{doc}.")
+    yield (
+        doc,
         (
-            f"{foreign} = {c.foreign}",
-            f"its `{DIGEST}` is not {c.names.digest}: other tables made it, or an older version of these",
+            Member(f"{ok} = -1", "the state may be gone on from", ok, origin),
+            Member(f"{foreign} = {c.foreign}", older, foreign, origin),
         ),
     )
-    yield "What else `check` gives", checks
     if c.names.places:
         doc = "`fault_at` where a table that others follow in a cycle has no line, or several"
-        numbered = ((name, table_position(c.program, table)) for table, name in c.names.places.items())
-        yield doc, tuple((f"{name} = {number}", "") for name, number in numbered)
-    yield "`fault`, and what a cycle returns", _numbered(c.names.faults, FAULT_DOCS)
+        numbered = ((table, name, table_position(c.program, table)) for table, name in c.names.places.items())
+        yield (
+            doc,
+            tuple(
+                Member(f"{name} = {number}", "", name, Origin(Sort.TABLE, table))
+                for table, name, number in numbered
+            ),
+        )
+    origins = [infrastructure("says why a cycle ended early")] * len(FAULT_DOCS)
+    yield "`fault`, and what a cycle returns", _numbered(c.names.faults, FAULT_DOCS, origins)
 
 
-def fields(c: CProgram) -> Iterator[tuple[str, str]]:
-    """Yield the members of the state: the declaration of each, and its doc."""
+def _declared_name(c: CProgram, leaf: str) -> str:
+    """The declared variable that a leaf is of."""
+    name = leaf.removesuffix(".next")
+    return next((one.name for one in c.program.declared if name in one.leaves), name)
+
+
+def fields(c: CProgram) -> Iterator[Member]:
+    """Give the members of the state."""
     variables = {v.name: v for v in c.program.variables}
     position = {v.name: at for at, v in enumerate(c.program.variables)}
     for variable in c.program.declared:
@@ -149,19 +192,18 @@ def fields(c: CProgram) -> Iterator[tuple[str, str]]:
             _safe_text(variables[variable.leaves[0]]),
             comment(variable.doc),
         ]
-        yield (
+        origin = Origin(Sort.VARIABLE, variable.name)
+        yield Member(
             declared(c.names, root, variable.type, defensive=c.plan.defensive),
             "; ".join(word for word in words if word),
+            root,
+            origin,
         )
         later = pending(variable.name)
         if later in variables:
             doc = f"{position[later]}: state; the deferred next value of {root}"
-            yield (
-                declared(
-                    c.names, "".join(c.names.paths[later]), variables[later].type, defensive=c.plan.defensive
-                ),
-                doc,
-            )
+            name, kind = "".join(c.names.paths[later]), variables[later].type
+            yield Member(declared(c.names, name, kind, defensive=c.plan.defensive), doc, name, origin)
 
 
 def size_text(c: CProgram) -> str:
@@ -191,14 +233,12 @@ def user_functions(c: CProgram) -> Iterator[tuple[str, tuple[str, ...]]]:
             )
 
 
-def externs(c: CProgram) -> Iterator[str]:
-    """Declare each user function once."""
-    declared = (
-        f"extern void {procedure.extern.c}({', '.join(map(''.join, _parameters(c, procedure))) or 'void'});"
-        for procedure in c.program.procedures
-        if procedure.extern is not None
-    )
-    yield from dict.fromkeys(declared)
+def externs(c: CProgram) -> Iterator[Member]:
+    """Declare each user function once; it is of the last procedure that calls it."""
+    last = {p.extern.c: p for p in c.program.procedures if p.extern is not None}
+    for name, procedure in last.items():
+        params = ", ".join(map("".join, _parameters(c, procedure))) or "void"
+        yield Member(f"extern void {name}({params});", "", name, Origin(Sort.PROCEDURE, procedure.name))
 
 
 def _parameters(c: CProgram, extern: Procedure) -> Iterator[tuple[str, str]]:

@@ -20,7 +20,7 @@ from rcsc.code.emit.code_tree import (
     when,
 )
 from rcsc.code.emit.identifiers import comment
-from rcsc.code.emit.plan import stated
+from rcsc.code.emit.plan import Origin, Sort, stated
 from rcsc.code.emit.translate import FAULT, FAULT_AT, STATE, local, local_word
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
@@ -33,7 +33,8 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
     params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} {local_word(p.name)}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
     body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
-    return Function(comment(stated(procedure, c.plan.files)), head, tuple(body))
+    origin = Origin(Sort.PROCEDURE, procedure.name)
+    return Function(comment(stated(procedure, c.plan.files)), head, tuple(body), origin=origin)
 
 
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:

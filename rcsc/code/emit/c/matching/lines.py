@@ -39,7 +39,13 @@ def match_function(c: CProgram, table: PlanTable) -> Function:
     doc = f"Finds the line of table {table.table.name}: its position; -1 none, -2 several."
     body = tuple(_match(c, table, name))
     unread = () if touches_state(body) else (discarded(STATE),)
-    return Function(doc, f"int32_t {c.p}_match_{name}(const {c.p}_t *s)", (*unread, *body), inline=True)
+    return Function(
+        doc,
+        f"int32_t {c.p}_match_{name}(const {c.p}_t *s)",
+        (*unread, *body),
+        inline=True,
+        origin=table.origin,
+    )
 
 
 def line_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
@@ -47,13 +53,13 @@ def line_functions(c: CProgram, table: PlanTable) -> Iterator[Function]:
     name = c.names.tables[table.table.name]
     doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
     found = Leave(Invoke(f"{c.p}_match_{name}", (STATE,)))
-    yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (found,))
+    yield Function(doc, f"int32_t {c.p}_{name}_line(const {c.p}_t *s)", (found,), origin=table.origin)
     i, n = Name("i"), Name("n")
     line = Invoke(f"{c.p}_{name}_line", (Prefix("&", Element(Name("in"), i)),))
     each = counted_loop(i, n, Set(Element(Name("out"), i), line), bound="n times")
     head = f"void {c.p}_{name}_lines(const {c.p}_t *in, int32_t *out, uint32_t n)"
     doc = f"The same for n inputs at once, table {table.table.name}."
-    yield Function(doc, head, (Let("uint32_t", "i"), each))
+    yield Function(doc, head, (Let("uint32_t", "i"), each), origin=table.origin)
 
 
 def _match(c: CProgram, table: PlanTable, name: str) -> Iterator[Stmt]:
