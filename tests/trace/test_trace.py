@@ -110,15 +110,17 @@ def test_code_that_nothing_in_the_tables_stands_for_is_told(
 
     def planted(*asked: Any) -> Any:
         text, *more = given(*asked)
-        before = "{% for function in publics %}"
-        return (text.replace(before, f"int other;\n\n{before}"), *more)
+        for before, other in (("publics", "int other;"), ("functions", "other = 1")):
+            loop = f"{{% for function in {before} %}}"
+            text = text.replace(loop, f"{other}\n\n{loop}")
+        return (text, *more)
 
     monkeypatch.setattr(templates, "cache", None)
     monkeypatch.setattr(templates.loader, "get_source", planted)
     files = emitted(plan)
     left = [where.rpartition(":") for where in matrix(plan, files, Known({})).untraced]
-    assert [name for name, _, _ in left] == ["c/door.h", "c/door.c"]
-    assert {files[name].splitlines()[int(at) - 1] for name, _, at in left} == {"int other;"}
+    told = {(name, files[name].splitlines()[int(at) - 1]) for name, _, at in left}
+    assert told == {("c/door.h", "int other;"), ("c/door.c", "int other;"), ("python/door.py", "other = 1")}
 
 
 def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(door: Path) -> None:

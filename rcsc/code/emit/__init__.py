@@ -30,7 +30,7 @@ bytes on every machine: no time, version or absolute path is in them. Trusted: a
 Modules, in the order the data flows: `lower` makes a `plan`; `decision` parts its lines by cuts; `identifiers` spells
 every name, free in its `scope`; `code_tree` is a small tree of code, which C and Python share, and its spelling in
 each; `translate` makes it of expressions and statements, the room `c` and `python` of whole files, by the templates
-of `rendering`, which keeps where each line of C comes from (`source_map`); `ranges` says what an analyser sees that
+of `rendering`, which keeps where each line of them comes from (`source_map`); `ranges` says what an analyser sees that
 keeps ranges alone: where that is too little, the C says what was proved. `generated` writes the files
 or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
@@ -39,9 +39,10 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from rcsc.code.emit.c.c99 import emit_c, outward, source_map
+from rcsc.code.emit.c.c99 import c_map, emit_c, outward
 from rcsc.code.emit.plan import Plan
-from rcsc.code.emit.python import emit_python
+from rcsc.code.emit.python import emit_python, python_map
+from rcsc.code.emit.rendering import Piece
 
 __all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted", "source_map"]
 
@@ -72,3 +73,8 @@ def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, 
     return {
         path: text for name in TARGETS if name in targets for path, text in TARGETS[name].emit(plan).items()
     }
+
+
+def source_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
+    """For each file of a plan where its lines come from, by path below the generated folder; nothing for what is no code."""
+    return c_map(plan) | python_map(plan)

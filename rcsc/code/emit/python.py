@@ -42,9 +42,11 @@ from rcsc.code.emit.plan import (
     Group,
     Index,
     Matcher,
+    Origin,
     Plan,
     PlanTable,
     Probe,
+    Sort,
     Truth,
     answering,
     first_value,
@@ -52,7 +54,7 @@ from rcsc.code.emit.plan import (
     stated,
     table_position,
 )
-from rcsc.code.emit.rendering import render
+from rcsc.code.emit.rendering import Piece, Rendered, render
 from rcsc.code.emit.translate import (
     FAULT,
     FAULT_AT,
@@ -80,9 +82,19 @@ MOST_GROUPED = 512
 
 
 def emit_python(plan: Plan) -> dict[str, str]:
-    """Return the Python module of the plan, by path below the generated folder."""
+    """The Python module of the plan, by path below the generated folder."""
+    return {file: rendered.text for file, rendered in _rendered(plan).items()}
+
+
+def python_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
+    """For the module where its lines come from."""
+    return {file: rendered.pieces for file, rendered in _rendered(plan).items()}
+
+
+def _rendered(plan: Plan) -> dict[str, Rendered]:
     maker = _Maker(plan)
-    return {f"python/{maker.names.program}.py": render("module.py.jinja", maker.view()).text}
+    file = f"python/{maker.names.program}.py"
+    return {file: render("module.py.jinja", maker.view(), file)}
 
 
 class _Maker:
@@ -93,8 +105,11 @@ class _Maker:
         self.program = plan.program
         self.names = names_in(plan)
         self.text = PyText(self.names)
+        self.origin = Origin(Sort.PROGRAM, plan.program.name)
         self.constants: list[tuple[str, tuple[str, ...]]] = []
-        self.lines: list[tuple[str, tuple[str, ...]]] = []
+        self.tables: list[Origin] = []
+        """Of each constant the table that it is made for."""
+        self.lines: list[tuple[str, tuple[str, ...], Origin]] = []
         self.modules = {
             module: self.names.module.fresh(f"_{module.replace('.', '_')}") for module in self._modules()
         }
@@ -114,14 +129,16 @@ class _Maker:
             "plan": self.plan,
             "source": comment(self.plan.source),
             "enums": [
-                (self.names.classes[e.name], self.names.class_members[e.name]) for e in self.program.enums
+                (self.names.classes[e.name], self.names.class_members[e.name], Origin(Sort.TYPE, e.name))
+                for e in self.program.enums
             ],
             "attributes": attributes,
             "failed": self.names.failed,
             "digest": digest(self.program, self.names).state,
             "foreign": len(self.program.variables) + len(self.program.invariants),
             "imports": self.modules.items(),
-            "constants": self.constants,
+            "constants": [(*made, of) for made, of in zip(self.constants, self.tables, strict=True)],
+            "whole": self.origin,
             "functions": functions,
             "lines": self.lines,
             "singles": any(
@@ -139,13 +156,18 @@ class _Maker:
         self.constants.append((name, rows))
         return Name(name)
 
+    def _on_state(self, doc: str, name: str, *body: Stmt, origin: Origin | None = None) -> Function:
+        """A function of the state; of all of the program where no other origin is given."""
+        return Function(doc, f"{name}(s)", body, origin=origin or self.origin)
+
     # --- procedures ---
 
     def _procedure(self, procedure: Procedure) -> Function:
         params = ", ".join(["s", *(local_word(p.name) for p in procedure.params)])
         body = self._extern(procedure) if procedure.extern is not None else self.text.block(procedure.body)
         head = f"_do_{self.names.procedures[procedure.name]}({params})"
-        return Function(comment(stated(procedure, self.plan.files)), head, tuple(body))
+        origin = Origin(Sort.PROCEDURE, procedure.name)
+        return Function(comment(stated(procedure, self.plan.files)), head, tuple(body), origin=origin)
 
     def _extern(self, procedure: Procedure) -> Iterator[Stmt]:
         assert procedure.extern is not None
@@ -185,7 +207,7 @@ class _Maker:
             body += _admitted(variable, value, Leave(Invoke("_refused", (STATE, Constant(at)))))
         stores = (Set(self.text.place(v.name), value) for value, (_, v) in zip(values, inputs, strict=True))
         trace = self._trace(Set(FAULT_AT, Constant(-1)))
-        return _on_state(
+        return self._on_state(
             "Admits every input; the fault.", "_admit", *trace, *body, *stores, Leave(Constant(0))
         )
 
@@ -206,12 +228,12 @@ class _Maker:
             "Whether the state may be gone on from: -1; FOREIGN where other tables made it; else the position of the first variable "
             "outside its range or, counted after the variables, of the first invariant that does not hold."
         )
-        return _on_state(doc, "check", *body, Leave(Constant(-1)))
+        return self._on_state(doc, "check", *body, Leave(Constant(-1)))
 
     def _begin(self) -> Iterator[Function]:
         if self.plan.defensive:
             at = Name("at")
-            yield _on_state(
+            yield self._on_state(
                 "Checks the state, then admits every input; the fault.",
                 "_begin",
                 Set(at, Invoke("check", (STATE,))),
@@ -228,7 +250,7 @@ class _Maker:
             for at, (v, _) in enumerate(deferred)
         )
         none = (Set(self.text.place(leaf), Constant(0)) for leaf in self.program.line_leaves.values())
-        return _on_state(
+        return self._on_state(
             "Deferred variables take their next values, all at once.", "_settle", *lets, *sets, *none
         )
 
@@ -240,16 +262,17 @@ class _Maker:
             shown = (
                 Set(self.text.place(variable.name), constant(variable.type, safe)) for variable, safe in pairs
             )
-            yield _on_state("After a fault: outputs that have a safe value show it.", "_safe", *shown)
+            yield self._on_state("After a fault: outputs that have a safe value show it.", "_safe", *shown)
 
-    def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
-        """Return the frame of every step and cycle."""
+    def _cycle(self, doc: str, name: str, origin: Origin, *body: Stmt) -> Function:
+        """The frame of every step and cycle."""
         begin = Invoke("_begin" if self.plan.defensive else "_admit", (STATE,))
         shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, _run("_safe")),) if shown else ()
         run = Frame(("try:",), (_run("_settle"), *body))
         refused = Frame(("except _Refused as refused:",), (_faulted(Fault.EXTERN, Name("refused.position")),))
-        return _on_state(doc, name, Set(FAULT, begin), when(FAULTLESS, run, refused), *safe, Leave(FAULT))
+        all_ = Set(FAULT, begin), when(FAULTLESS, run, refused), *safe, Leave(FAULT)
+        return self._on_state(doc, name, *all_, origin=origin)
 
     # --- tables ---
 
@@ -258,22 +281,24 @@ class _Maker:
         upper = f"_{name.upper()}"
         actions = self.names.module.fresh(f"{upper}_ACTIONS")
         doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
-        yield _on_state(doc, f"{name}_line", *self._match(table, upper))
+        matched = tuple(self._match(table, upper))
+        self.tables += [table.origin] * (len(self.constants) - len(self.tables))
+        yield self._on_state(doc, f"{name}_line", *matched, origin=table.origin)
         many = Leave(Name(f"[{name}_line(s) for s in states]"))
-        yield Function(
-            f"The same for many inputs, table {table.table.name}.", f"{name}_lines(states)", (many,)
-        )
+        same = f"The same for many inputs, table {table.table.name}."
+        yield Function(same, f"{name}_lines(states)", (many,), origin=table.origin)
         doc = f"Matches table {table.table.name} and runs the line.{comment(answering(table.table.requirements))}"
-        yield _on_state(doc, f"_run_{name}", *self._run(table, name, actions))
+        yield self._on_state(doc, f"_run_{name}", *self._run(table, name, actions), origin=table.origin)
         acts = tuple(self.names.module.fresh(f"_{name}_{number}") for number, _ in enumerate(table.lines))
         for act, line in zip(acts, table.lines, strict=True):
             body = self.text.block([action.statement for action in line.actions])
-            yield _on_state(comment(line.place), act, *body)
-        self.lines.append((actions, acts))
+            origin = Origin(Sort.LINE, table.table.name, line.name)
+            yield self._on_state(comment(line.place), act, *body, origin=origin)
+        self.lines.append((actions, acts, table.origin))
         lines = self.names.module.fresh(f"{name.upper()}_LINES")
-        self.lines.append((lines, tuple(f'"{line.name}"' for line in table.lines)))
+        self.lines.append((lines, tuple(f'"{line.name}"' for line in table.lines), table.origin))
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; the fault, 0 for none."
-        yield self._cycle(doc, f"{name}_step", _run(f"_run_{name}"))
+        yield self._cycle(doc, f"{name}_step", table.origin, _run(f"_run_{name}"))
 
     def _match(self, table: PlanTable, upper: str) -> Iterator[Stmt]:
         matcher = table.matcher
@@ -399,7 +424,8 @@ class _Maker:
         rest: Body = (last, when(FAULTLESS, *after)) if after else (last,)
         for stage in reversed(level.stages):
             rest = (*self._stage(stage), when(FAULTLESS, *rest))
-        return self._cycle(doc, f"{self.names.levels[level.name]}_cycle", *before, *rest)
+        name, origin = f"{self.names.levels[level.name]}_cycle", Origin(Sort.LEVEL, level.name)
+        return self._cycle(doc, name, origin, *before, *rest)
 
     def _chosen(self, choice: model.TableChoice) -> str:
         """Spell the function of the table that a choice runs."""
@@ -423,10 +449,6 @@ class _Maker:
             ]
             at = Name(f"{{{', '.join(pairs)}}}[{IN_PYTHON.code(self.text.expr(choice.selector))}]")
         yield when(unmatched, Set(FAULT_AT, at))
-
-
-def _on_state(doc: str, name: str, *body: Stmt) -> Function:
-    return Function(doc, f"{name}(s)", body)
 
 
 def _run(name: str) -> Do:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import jinja2
 
@@ -31,8 +32,10 @@ DIRECTIVES = (
     ('extern "C" {', "lets C++ call it"),
     ("}", "lets C++ call it"),
 )
-"""What lines outside of marks are for, by how they begin."""
-SAID = "says what the file is"
+"""What lines of C outside of marks are for, by how they begin."""
+SAID, LIBRARY = "says what the file is", "the standard library"
+STATEMENTS = (("import ", LIBRARY), ("from ", LIBRARY), ('"""', SAID))
+"""What lines of Python outside of marks are for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +57,7 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Rendered:
-    """A file, and where its lines come from; only of C."""
+    """A file, and where its lines come from; only of C and Python."""
 
     text: str
     pieces: tuple[Piece, ...] = ()
@@ -100,11 +103,15 @@ def render(template: str, view: Mapping[str, object], file: str = "") -> Rendere
         file: What it makes, below the generated folder.
     """
     text = environment().get_template(template).render(view)
-    if not template.endswith((".c.jinja", ".h.jinja")):
+    if not template.endswith((".c.jinja", ".h.jinja", ".py.jinja")):
         return Rendered(text)
-    first, *others = text.splitlines()  # the first says of which program the file is: it is read again
-    reading = _Reading(file)
-    for line in (first, *(line for long in others for line in folded(long))):
+    if template.endswith(".py.jinja"):
+        reading, lines = _Reading(file, STATEMENTS, gapless=True, begun=1), text.split("\n")[:-1]
+    else:
+        first, *others = text.splitlines()  # the first says of which program the file is: it is read again
+        lines = [first, *(line for long in others for line in folded(long))]
+        reading = _Reading(file, DIRECTIVES)
+    for line in lines:
         reading.take(line)
     return Rendered("\n".join([*reading.lines, ""]), tuple(reading.pieces))
 
@@ -114,7 +121,7 @@ class _Open:
     """A mark that did not end yet: its line, what is said of it, the pieces inside."""
 
     first: int
-    said: Sequence[str]
+    said: Sequence[Any]
     inside: list[Piece] = field(default_factory=list)
 
 
@@ -123,10 +130,15 @@ class _Reading:
     """Takes lines one by one, and keeps where they come from.
 
     Attributes:
-        begun: The first line of a comment outside of marks whose reason is still to come; 0 for none.
+        reasons: What lines outside of marks are for, by how they begin.
+        gapless: Whether each piece begins where the one before ended, as comments and blank lines belong to what follows.
+        begun: The first line of what is still to be told; 0 where none is.
+        comment: Whether a comment outside of marks did not end yet.
     """
 
     file: str
+    reasons: Sequence[tuple[str, str]]
+    gapless: bool = False
     lines: list[str] = field(default_factory=list)
     pieces: list[Piece] = field(default_factory=list)
     marks: list[_Open] = field(default_factory=list)
@@ -139,7 +151,7 @@ class _Reading:
         if word == END:
             self._end()
         elif word.startswith(END):
-            self.marks.append(_Open(len(self.lines) + 1, json.loads(word.removeprefix(END))))
+            self.marks.append(_Open(self.begun or len(self.lines) + 1, json.loads(word.removeprefix(END))))
         else:
             self.lines.append(line)
             if not self.marks:
@@ -155,21 +167,24 @@ class _Reading:
         origin = Origin(Sort(sort), of, line)
         own = [Piece(self.file, first, end, name, origin) for first, end in spans]
         (self.marks[-1].inside if self.marks else self.pieces).extend((*own, *mark.inside))
+        self.begun = last + 1 if self.gapless else 0
 
     def _outside(self, line: str, at: int) -> None:
         """A line that no mark is around: a comment, a directive, a frame for C++; nobody knows what another is for."""
         told = self.comment or line.startswith("/*")
-        reason = next((reason for begin, reason in DIRECTIVES if line.startswith(begin)), "")
+        reason = next((reason for begin, reason in self.reasons if line.startswith(begin)), "")
         if told:
             self.begun, self.comment = self.begun or at, not line.endswith("*/")
         elif reason:
             self._told(at, reason)
+        elif self.gapless:
+            self.begun = self.begun if line.startswith("#") or not line else at + 1
         elif not line and self.begun:
             self._told(at - 1, SAID)
 
     def _told(self, last: int, reason: str) -> None:
         self.pieces.append(Piece(self.file, self.begun or last, last, "", infrastructure(reason)))
-        self.begun = 0
+        self.begun = last + 1 if self.gapless else 0
 
 
 def folded(line: str) -> Iterator[str]:

@@ -3,18 +3,17 @@
 In: proved programs, their emitted files, test vectors and verdicts. Out: a matrix of each program, as data, as a page, as CSV and
 JSON, and findings: code that comes from nothing, requirements without a place, a kept matrix of another version.
 
-Of C the emitter says where each line comes from (`emit.source_map`, `link.system_map`); Python is read back from its text by its own
-parser, by names alone. Every line that is not blank lies in a piece with an origin, or is a finding.
+The emitter says where each line of C and Python comes from (`emit.source_map`, `link.system_map`). Every line of C that is not blank, and
+every line of Python, lies in a piece with an origin, or is a finding.
 
 >>> from rcsc.code.emit.plan import Origin, Sort
 >>> Origin(Sort.LINE, "acquire", "3").words
 'acquire line 3'
 
-Trusted: what the templates and the emitter say of their lines, and of Python the names, that is `emit.identifiers`. Whether the code of
-a line does what the line says is no question here: `rcsc test` answers it. What it costs: a proof of the tables, and the search for
-vectors, which `--no-vectors` leaves out.
+Trusted: what the templates and the emitter say of their lines. Whether the code of a line does what the line says is no question here:
+`rcsc test` answers it. What it costs: a proof of the tables, and the search for vectors, which `--no-vectors` leaves out.
 
-Modules: `python_code` (a module to pieces), `matrix` (all of one program), `proofs` (verdicts, and properties as far as they are
+Modules: `matrix` (all of one program), `proofs` (verdicts, and properties as far as they are
 known), `requirements` (against a list), `tables_of` (CSV and JSON), `page` (HTML), `answer` (one question), `collect` (all of it, for
 the command).
 """

@@ -29,7 +29,6 @@ from rcsc.lang.model import (
     Statement,
 )
 from rcsc.run.link import Linked, system_map
-from rcsc.views.trace.python_code import python_pieces
 
 OWES_NOTHING = "proved: it owes nothing"
 KEPT = "proved: every cycle keeps it"
@@ -237,8 +236,8 @@ def _hashed(files: Mapping[str, str]) -> dict[str, str]:
 
 def _pieces(plan: Plan, code: Mapping[str, str]) -> Iterator[Piece]:
     maps = source_map(plan)
-    for path, text in code.items():
-        yield from python_pieces(plan, path, text) if path.endswith(".py") else maps[path]
+    for path in code:
+        yield from maps[path]
 
 
 def untraced(code: Mapping[str, str], pieces: Iterable[Piece]) -> Iterator[str]:

@@ -87,7 +87,7 @@ def emit_c(plan: Plan) -> dict[str, str]:
     return {file: rendered.text for file, rendered in _rendered(plan).items()}
 
 
-def source_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
+def c_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
     """For each of the C files where its lines come from."""
     return {file: rendered.pieces for file, rendered in _rendered(plan).items()}
 
