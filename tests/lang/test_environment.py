@@ -13,7 +13,8 @@ from rcsc.lang.model import Kind, Value, key_bounds
 from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refusable, unadmitted
 from rcsc.lang.restart import NUMBERED, After, Fixed, SameAs
 from rcsc.proof.symbolic import values
-from rcsc.run.episodes.episode import FAULTS, MADE
+from rcsc.run.episodes.episode import FAULTS
+from rcsc.run.episodes.sampling import MADE
 from rcsc.run.signature import FAULTS as FAULT_NAMES
 from tests.support.programs.stages import program_of
 

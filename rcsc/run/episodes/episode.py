@@ -14,7 +14,6 @@ from rcsc.base.host.files import csv_text
 from rcsc.base.host.files.names import shown
 from rcsc.base.host.files.plain import plain, read
 from rcsc.base.host.files.read import json_of
-from rcsc.lang.protocol.environment import Event
 from rcsc.run.system import Kind
 
 Harm = Literal["lost", "late", "doubled", "stale"]
@@ -29,8 +28,6 @@ FAULTS = {
     "changed order": "an order: it comes before the one before it has ended",
 }
 """Classes of faults that follow from declarations; those of a plant come by their names."""
-MADE = {"refused": Event.INPUT_REFUSED, "restarted": Event.BEGUN_ANEW}
-"""Those of them that are events of a level; the others are what its buffers and its environment bring."""
 Setting: TypeAlias = bool | int | float | str
 """A value as a script has it: an enumeration's member by its name."""
 MOST_TICK = 2_000_000
