@@ -39,7 +39,8 @@ from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, Restart
+from rcsc.run.episodes.episode import Restart
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption
 from rcsc_cell.episodes.loop import Loop
 from tests.matrix import ACQUIRE, project
 from tests.support.faults_made import LEVELS, Fault, sample

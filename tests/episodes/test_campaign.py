@@ -39,6 +39,7 @@ from rcsc.run.campaign.shrink import shrink
 from rcsc.run.campaign.summary import as_json, as_text, summary
 from rcsc.run.campaign.work import OtherTables, play
 from rcsc.run.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
+from rcsc.run.episodes.episode import BufferFault, Restart
 from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc_cell.episodes.episode import (
     FAULTS,
@@ -48,8 +49,6 @@ from rcsc_cell.episodes.episode import (
     Interruption,
     PartSpec,
     Push,
-    Restart,
-    TransportSpec,
 )
 from rcsc_cell.episodes.kind import CELL
 from rcsc_cell.workstation.script import read_script
@@ -450,7 +449,7 @@ def test_lines_are_bits_and_every_line_of_the_tables_is_known() -> None:
 
 EVERYTHING = Episode(
     parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
-    transport=(TransportSpec("task.to_workstation", "lost", 3, 4),), restarts=(Restart(3, "task"),),
+    transport=(BufferFault("task.to_workstation", "lost", 3, 4),), restarts=(Restart(3, "task"),),
     interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
 )  # fmt: skip
 
@@ -483,7 +482,7 @@ SWITCHES = [
     FaultSpec(name, at, at + 5)
     for at, name in enumerate(("drops", "dark", "blind", "noisy", "slips", "tilted"))
 ]
-HARMED = [TransportSpec("task.to_workstation", "lost", at, at) for at in range(5)]
+HARMED = [BufferFault("task.to_workstation", "lost", at, at) for at in range(5)]
 
 
 def _some(of: Sequence[Any]) -> st.SearchStrategy[tuple[Any, ...]]:
@@ -495,7 +494,7 @@ def _some(of: Sequence[Any]) -> st.SearchStrategy[tuple[Any, ...]]:
 def test_what_is_needed_is_what_is_left(
     parts: tuple[PartSpec, ...],
     faults: tuple[FaultSpec, ...],
-    harmed: tuple[TransportSpec, ...],
+    harmed: tuple[BufferFault, ...],
     draw: st.DataObject,
 ) -> None:
     needed = [

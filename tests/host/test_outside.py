@@ -58,7 +58,7 @@ FORMATS_OF_OURS = {
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
     "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/run/link/beside.py",
-    "rcsc/run/orders/stopped.py", "rcsc/proof/certify", "sim/rcsc_cell/episodes/loop.py", "rcsc/run/campaign/work.py",
+    "rcsc/run/orders/stopped.py", "rcsc/proof/certify", "rcsc/run/campaign/work.py",
 }  # fmt: skip
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
 

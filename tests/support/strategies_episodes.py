@@ -6,16 +6,9 @@ Small values come first, so that what fails shrinks to a nominal episode with th
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from rcsc.run.episodes.episode import BufferFault, Restart
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import (
-    Episode,
-    FaultSpec,
-    Interruption,
-    PartSpec,
-    Push,
-    Restart,
-    TransportSpec,
-)
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Push
 from rcsc_cell.episodes.sampling import (
     BUFFERS,
     EMPTY_HAND,
@@ -87,11 +80,11 @@ def faults(draw: st.DrawFn, ticks: SearchStrategy[int] = TICKS) -> FaultSpec:
 
 
 @st.composite
-def harms(draw: st.DrawFn, ticks: SearchStrategy[int] = TICKS) -> TransportSpec:
+def harms(draw: st.DrawFn, ticks: SearchStrategy[int] = TICKS) -> BufferFault:
     """Something that happens to a buffer."""
     first = draw(ticks)
     last = first + draw(st.sampled_from((0, 1, 3, 10, 40)))
-    return TransportSpec(
+    return BufferFault(
         draw(st.sampled_from(BUFFERS)), draw(st.sampled_from(HARMS)), first, last, draw(st.integers(1, 8))
     )
 
@@ -114,10 +107,10 @@ def pushes() -> SearchStrategy[Push]:
 
 @st.composite
 def episodes(draw: st.DrawFn, backend: Backend = "kinematic") -> Episode:
-    """A legal script, what it needs, and up to three things that go wrong."""
+    """A legal script, what it needs, and up to six things that go wrong."""
     kind = draw(st.sampled_from(tuple(KINDS)))
     here = draw(st.one_of(st.tuples(parts(kind)), st.tuples(parts()), st.just(())))
-    odd = draw(st.lists(st.one_of(faults(), harms(), restarts(), interruptions(), pushes()), max_size=3))
+    odd = draw(st.lists(st.one_of(faults(), harms(), restarts(), interruptions(), pushes()), max_size=6))
     if backend == "mujoco":
         odd = [trouble for trouble in odd if not isinstance(trouble, Push)]
 
@@ -131,7 +124,7 @@ def episodes(draw: st.DrawFn, backend: Backend = "kinematic") -> Episode:
         here,
         draw(legal(kind)),
         some(FaultSpec),  # type: ignore[arg-type]  # each is of the type that was asked for
-        some(TransportSpec),  # type: ignore[arg-type]
+        some(BufferFault),  # type: ignore[arg-type]
         some(Restart),  # type: ignore[arg-type]
         some(Interruption),  # type: ignore[arg-type]
         pushes=some(Push),  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rcsc.base.host.files.names import shown
 from rcsc.lang.project import load
-from rcsc.run.campaign.rig import EpisodeKind, NamedFile, run_sources, sources, usual_chunk
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, run_sources, usual_chunk
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, Description, description, places
 from rcsc.run.episodes.episode import Episode
@@ -28,9 +28,6 @@ _MODEL_FILES = frozenset(
 )
 """What a model may be made of, beside its own file and below it."""
 _PHYSICS_CHUNK = 4
-_PACKAGE = Path(__file__).parents[2]
-_ROOMS = ("run/episodes", "lang", "code/testing/executors")
-"""What draws episodes and watches them: properties are evaluated by the interpreter, edges taken from tests of the tables."""
 
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
@@ -52,12 +49,7 @@ def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
     seen = dict.fromkeys(file.resolve() for file in own)
     named = [(Path(os.path.relpath(file, system.parent.resolve())).as_posix(), file) for file in seen]
     installed = [] if spec is None else _module(spec)
-    return [
-        *named,
-        *installed,
-        *run_sources(),
-        *(module for room in _ROOMS for module in sources(_PACKAGE / room)),
-    ]
+    return [*named, *installed, *run_sources()]
 
 
 def _programs(described: Description, system: Path) -> Iterator[Path]:

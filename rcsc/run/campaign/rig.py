@@ -22,6 +22,8 @@ LineName: TypeAlias = tuple[str, str, str]
 """Level, table, line."""
 NamedFile: TypeAlias = tuple[str, Path]
 """A file, and a name for it that is the same in every checkout."""
+_ROOMS = ("run", "episodes", "lang", "testing/executors")
+"""What runs episodes, draws them and watches them: properties are evaluated by the interpreter, edges taken from tests of the tables."""
 
 
 class EpisodeValue(Protocol):
@@ -177,8 +179,9 @@ def digest(rig: Rig[Any]) -> str:
 
 
 def run_sources() -> list[NamedFile]:
-    """Every module that has a part in a run of any system."""
-    return sources(Path(__file__).parents[1], "log", "link", "episodes", "campaign")
+    """Every module that has a part in an episode of any system, in its run and in what watches it."""
+    package = Path(__file__).parents[1]
+    return [module for room in _ROOMS for module in sources(package / room, "log")]
 
 
 def sources(folder: Path, *lookers: str) -> list[NamedFile]:

@@ -124,5 +124,6 @@ class HarmedMemory(CommonMemory):
     def _show(self, name: str, values: Values | None) -> None:
         if values is not None:
             self._seen[name] = values
-            held = self._holding.get(name, {})
-            super().publish(name, tuple(held.get(place, value) for place, value in enumerate(values)))
+            if held := self._holding.get(name):
+                values = tuple(held.get(place, value) for place, value in enumerate(values))
+            super().publish(name, values)

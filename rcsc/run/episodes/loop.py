@@ -27,7 +27,7 @@ from rcsc.run.plant.bind import PlantFailed
 from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged
 from rcsc.run.signature import STOPPED, Value, Values
-from rcsc.run.system import Outside, System, check_answered, executors
+from rcsc.run.system import Outside, System, check_answered, several_executors
 from rcsc.run.unproved import refuse_unproved
 
 COOL_TICKS = 30
@@ -52,14 +52,15 @@ def run(
         ValueError: The episode names what the system has not.
         OSError: The log cannot be written.
     """
-    loop = Loop(episode, stand(Path(system)), claims)
-    if log is None:
-        return loop.finish()
-    from rcsc.run.log.recorder import Recorder  # of an extra
+    return Loop(episode, stand(Path(system)), claims).finish(log)
 
-    with Recorder(loop.system, log) as recorder:
-        loop.system.watch.insert(0, recorder)
-        return loop.finish()
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What stands around the levels of an episode: all that is outside, and who gives the orders."""
+
+    stage: Staged
+    operator: EpisodeOperator
 
 
 def held(its: Stand, readings: tuple[Reading, ...]) -> Iterator[tuple[Field, Held]]:
@@ -93,20 +94,24 @@ def check(episode: Episode, system: Path) -> None:
     _checked(episode, stand(system))
 
 
-def _checked(episode: Episode, its: Stand) -> tuple[Staged, EpisodeOperator, list[tuple[Field, Held]]]:
-    stage = staged(StageOrder(str(its.path), episode.plant, seed=episode.seed), its.system, its.signs)
+def _checked(
+    episode: Episode, its: Stand, around: Around | None = None
+) -> tuple[Around, list[tuple[Field, Held]]]:
+    if around is None:
+        stage = staged(StageOrder(str(its.path), episode.plant, seed=episode.seed), its.system, its.signs)
+        around = Around(stage, operator(its.served, episode.orders))
     for name in (harm.buffer for harm in episode.harms):
         if name not in its.buffers:
             raise ValueError(f"there is no buffer `{name}`")
     for name in (restart.level for restart in episode.restarts):
         if name not in its.signs:
             raise ValueError(f"there is no level `{name}`")
-    known = faults_of(stage.outside)
+    known = faults_of(around.stage.outside)
     switched = (one.fault for one in episode.switches)
     for name in (*switched, *(fault for order in episode.orders for fault in order.faults)):
         if name not in known:
             raise ValueError(f"the plant has no fault `{name}`")
-    return stage, operator(its.served, episode.orders), list(held(its, episode.readings))
+    return around, list(held(its, episode.readings))
 
 
 def _windows(episode: Episode) -> Iterator[tuple[int, int]]:
@@ -144,17 +149,28 @@ class _Ordered:
 class Loop:
     """A running episode.
 
+    Args:
+        episode: What to run.
+        its: The system.
+        claims: What was proved of it.
+        around: A plant and an operator of one's own; None for those that the description and the episode name.
+
     Attributes:
         system: The running system.
         cycle: What the properties saw last.
+        watching: The properties, in order.
+        executors: Makes an executor for each level, others at each call.
 
     Raises:
         CodedError, ValueError: As `check`.
     """
 
-    def __init__(self, episode: Episode, its: Stand, claims: Claims = NOTHING) -> None:
+    def __init__(
+        self, episode: Episode, its: Stand, claims: Claims = NOTHING, around: Around | None = None
+    ) -> None:
         self.episode, self._its = episode, its
-        self._stage, self.operator, fields = _checked(episode, its)
+        around, fields = _checked(episode, its, around)
+        self._stage, self.operator = around.stage, around.operator
         refuse_unproved(its.system)
         check_answered(its.system, self._stage.queries)
         first: dict[str, tuple[Value, ...]] = {
@@ -162,7 +178,8 @@ class Loop:
         }
         self._memory = HarmedMemory(episode.harms, (one for _, one in fields), first)
         self._held = fields
-        by_level = executors(its.system, its.signs, episode.executor)
+        self.executors = several_executors(its.system, its.signs, episode.executor)
+        by_level = self.executors()
         levels = tuple(
             running_level(spec, its.system, its.signs[spec.name], by_level[spec.name], self._stage.queries)
             for spec in its.system.levels
@@ -175,7 +192,7 @@ class Loop:
             {level.name: level for level in levels}, self._stage.plants, self.operator, self._memory.said,
             {level.name: level.initial for level in levels}, {level.name: level.initial for level in levels},
         )  # fmt: skip
-        self._properties = properties(its, its.system.within, claims)
+        self.watching = properties(its, its.system.within, claims)
         self._explained, self._seen = Explanations(its), _Seen()
         self._on = frozenset[str]()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
@@ -192,12 +209,23 @@ class Loop:
         at_end = bool(self._end) or any(getattr(part, "over", False) for part in self._stage.outside)
         return at_end or (self.operator.over and self._cool <= 0 and waited)
 
-    def finish(self) -> EpisodeOutcome:
-        """Runs to the end.
+    @property
+    def findings(self) -> tuple[EpisodeFinding, ...]:
+        """The first of each property that did not hold so far, but what a fault explains."""
+        return tuple(self._seen.findings.values())
+
+    def finish(self, log: Path | None = None) -> EpisodeOutcome:
+        """Runs to the end, and keeps every cycle where `log` says where.
 
         Raises:
             OSError: The log cannot be written.
         """
+        if log is not None:
+            from rcsc.run.log.recorder import Recorder  # of an extra
+
+            with Recorder(self.system, log) as recorder:
+                self.system.watch.insert(0, recorder)
+                return self.finish()
         while not self.over:
             self.step()
         return self.outcome()
@@ -207,8 +235,9 @@ class Loop:
         tick = self.system.tick
         self._memory.begin(tick)
         self._switch(tick)
-        self.cycle.restarted = frozenset(one.level for one in self.episode.restarts if one.tick == tick)
-        for name in sorted(self.cycle.restarted):
+        restarted = sorted(one.level for one in self.episode.restarts if one.tick == tick)
+        self.cycle.restarted = frozenset(restarted)
+        for name in restarted:
             self._restart(name)
         self.cycle.faulty = bool(self._on) or any(first <= tick <= last for first, last in self._windows)
         self.cycle.refused = self._to_refuse(tick)
@@ -245,7 +274,7 @@ class Loop:
             if line.given is not None and line.ended is None
         ]
         return EpisodeOutcome(
-            tuple(ends), tuple(self._seen.findings.values()), self._end or self._ended(), self.system.tick,
+            tuple(ends), self.findings, self._end or self._ended(), self.system.tick,
             frozenset(lines), self._digest.hexdigest(), tuple(self._seen.excused.values()),
         )  # fmt: skip
 
@@ -304,7 +333,7 @@ class Loop:
                 self._seen.staged.update((level.name, table, line) for table, line in before)
         cycle.tick, cycle.ran = system.tick, ran
         self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
-        for watcher in self._properties:
+        for watcher in self.watching:
             for broken in watcher.watch(cycle):
                 self._find(broken, system.tick)
         for level in ran:

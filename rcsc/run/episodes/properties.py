@@ -87,14 +87,20 @@ class AssumptionsHold:
                     yield Broken(f"{level.name}: assumption {name}", message, level.name, reads)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class LevelProperty:
-    """A property that a program declares, or that comes with the protocol."""
+    """A property that a program declares, or that comes with the protocol.
+
+    Attributes:
+        now, before: Where what it reads stands among the level's values, and what it reads of the cycle before.
+        held: The values that it was asked about last, where it held: most cycles change none of them.
+    """
 
     level: str
     property: model.Property
     now: Mapping[str, int]
     before: Mapping[str, int]
+    held: Values | None = None
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """The values on which it does not hold; what a refused cycle left of inputs alone breaks nothing."""
@@ -102,10 +108,17 @@ class LevelProperty:
         if level not in cycle.ran or level.fault:
             return
         left, taken = cycle.left[self.level], cycle.before[self.level]
+        read = (
+            *(level.values[at] for at in self.now.values()),
+            *(left[at] for at in self.before.values()),
+        )
+        if read == self.held:
+            return
         what = self._wrong(level.values, left)
         if what is None or (
             left != taken and self._wrong(level.values, _inputs_of(level, taken, left)) is None
         ):
+            self.held = read if what is None else None
             return
         leaves = level.sign.leaves
         words = [f"`{name}` = {leaves[at].shown(level.values[at])}" for name, at in self.now.items()]
@@ -209,7 +222,9 @@ def numbered(stand: Stand, link: Served) -> tuple[int, ...]:
 
 @dataclass(slots=True)
 class AnswerStays:
-    """What was answered of an order stays until the next, but of the order to rest; where the program does not say so itself.
+    """What was answered of an order stays until the next, but of the order to rest.
+
+    The standard properties of a level with `roles` leave out an answer that is given in the cycle which takes the order.
 
     An order that stands when the level starts anew has failed. What `rcsc prove` asks of such a level in every cycle, this asks of each
     that runs, whether or not it was proved; a cycle that a fault ends publishes, too.
@@ -325,9 +340,8 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
         watching.append(TakesInTurn(link, at, {first: 0, echo: 0}))
         if link.party in stand.programs:
             watching.append(NumbersOrders(link, numbered(stand, link)))
-        if stand.programs[link.level].roles is None:  # else its standard properties say it
-            told = int(link.order_leaves[link.command].initial)
-            said = echo, link.report_leaves[link.status].shown(link.report_leaves[link.status].initial)
-            watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name], told, said))
+        told = int(link.order_leaves[link.command].initial)
+        said = echo, link.report_leaves[link.status].shown(link.report_leaves[link.status].initial)
+        watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name], told, said))
     proved = [ProvedHolds(claims, stand)] if claims.levels else []
     return [*watching, Ends(within), PlantHolds(), *proved]

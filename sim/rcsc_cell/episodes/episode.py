@@ -9,26 +9,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import chain
 from pathlib import Path
-from typing import ClassVar, Literal, get_args
+from typing import ClassVar, get_args
 
 from rcsc.base.host.files.names import shown
 from rcsc.base.host.files.plain import plain, read
 from rcsc.base.host.files.read import json_of
+from rcsc.run.episodes.episode import FAULTS as OF_ANY_SYSTEM
+from rcsc.run.episodes.episode import BufferFault, Harm, Restart
+from rcsc.run.episodes.episode import Episode as EpisodeOfAnySystem
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
 
 SYSTEM = Path(__file__).parents[3] / "tables" / "system.toml"
-HARM = Literal["lost", "doubled", "stale", "delayed"]
 COLUMNS = "command,part,source,dest,end_at"
 
 FAULTS: Mapping[str, str] = {
     **{switch.name: "a switch of rcsc_cell.cell.faults" for switch in fields(Faults)},
-    "lost": "a buffer: what is published in some cycles never arrives",
-    "doubled": "a buffer: each value is read in two cycles, and every other one never",
-    "stale": "a buffer: readers see one value for some cycles",
-    "delayed": "a buffer: values arrive some cycles late, in order",
-    "restarted": "a level: it loses its state, and goes on as a restarted process does",
+    **{name: OF_ANY_SYSTEM[name] for name in (*get_args(Harm), "restarted")},
     "pushed": "parts: somebody pushes one that lies there; without physics only",
     "missing part": "parts: what the script asks for is nowhere",
     "wrong part": "parts: another lies where it should be",
@@ -41,9 +39,9 @@ FAULTS: Mapping[str, str] = {
 
 
 REACH: Mapping[str, tuple[float, float]] = {
-    "seed": (0, 2**64), "step_s": (0.0002, 0.04), "tick": (0, 1_000_000), "first_tick": (0, 1_000_000),
-    "last_tick": (-1, 2_000_000), "ticks": (0, 10_000), "part": (0, 1000), "value": (-1e6, 1e6), "x_mm": (-1e4, 1e4),
-    "y_mm": (-1e4, 1e4), "yaw_deg": (-1e4, 1e4), "size_mm": (0.1, 1000.0), "density_kg_m3": (1.0, 1e5), "friction": (0.0, 100.0),
+    "step_s": (0.0002, 0.04), "tick": (0, 1_000_000), "first_tick": (0, 1_000_000), "last_tick": (-1, 2_000_000),
+    "part": (0, 1000), "value": (-1e6, 1e6), "x_mm": (-1e4, 1e4), "y_mm": (-1e4, 1e4), "yaw_deg": (-1e4, 1e4),
+    "size_mm": (0.1, 1000.0), "density_kg_m3": (1.0, 1e5), "friction": (0.0, 100.0),
 }  # fmt: skip
 """Between what each number of an episode lies; what is drawn lies well within."""
 
@@ -77,25 +75,6 @@ class FaultSpec:
     first_tick: int
     last_tick: int
     value: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class TransportSpec:
-    """What happens to a buffer in these ticks; `ticks` is how late a delayed value comes."""
-
-    buffer: str
-    kind: HARM
-    first_tick: int
-    last_tick: int
-    ticks: int = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Restart:
-    """A level loses its state before it runs in this tick."""
-
-    tick: int
-    level: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +115,7 @@ class Episode:
     parts: tuple[PartSpec, ...] = ()
     rows: tuple[str, ...] = ()
     faults: tuple[FaultSpec, ...] = ()
-    transport: tuple[TransportSpec, ...] = ()
+    transport: tuple[BufferFault, ...] = ()
     restarts: tuple[Restart, ...] = ()
     interruptions: tuple[Interruption, ...] = ()
     step_s: float = 0.002
@@ -146,14 +125,13 @@ class Episode:
         """Refuses what no episode can be.
 
         Raises:
-            ValueError: An unknown backend, executor, fault or harm; a number out of reach; a push with physics.
+            ValueError: An unknown backend or fault; a number out of reach; a push with physics; what no system's episode can be.
         """
+        self.in_any_system()
         known = {switch.name for switch in fields(Faults)}
         for word, words in (
             (self.backend, get_args(Backend)),
-            (self.executor, get_args(Kind)),
             *((fault.name, known) for fault in self.faults),
-            *((transport_spec.kind, get_args(HARM)) for transport_spec in self.transport),
         ):
             if word not in words:
                 raise ValueError(f"{shown(word)} is none of {', '.join(sorted(words))}")
@@ -166,9 +144,15 @@ class Episode:
         if self.pushes and self.backend != "kinematic":
             raise ValueError("with physics nothing but a force moves a part")
 
+    def in_any_system(self) -> EpisodeOfAnySystem:
+        """What of it any system's episode could have."""
+        return EpisodeOfAnySystem(
+            executor=self.executor, seed=self.seed, harms=self.transport, restarts=self.restarts
+        )
+
     def _numbers(self) -> Iterator[tuple[str, float]]:
         """Yield every number in it, by the name of its field."""
-        yield from (("seed", self.seed), ("step_s", self.step_s))
+        yield "step_s", self.step_s
         for element in chain.from_iterable(getattr(self, name) for name in self.LISTS):
             for name in REACH:
                 value = getattr(element, name, ())

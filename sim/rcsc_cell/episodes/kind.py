@@ -47,12 +47,17 @@ def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG0
     """Refuse what the system has not.
 
     Raises:
-        ValueError: A level.
+        ValueError: A level, or a buffer.
     """
-    levels = {level.name for level in description(system).levels}
+    described = description(system)
+    levels = {level.name for level in described.levels}
     for restart in episode.restarts:
         if restart.level not in levels:
             raise ValueError(f"there is no level {shown(restart.level)} to start again")
+    buffers = {wire.source for wire in described.wires}
+    for harm in episode.transport:
+        if harm.buffer not in buffers:
+            raise ValueError(f"there is no buffer {shown(harm.buffer)}")
     return episode
 
 
@@ -65,10 +70,13 @@ def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # bot
 
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:  # noqa: ARG001  # both plants are of the same
-    """The data, the scripts, and the programs around the executors."""
+    """The data, the scripts, the tables that say what is to hold, and the programs around the executors."""
+    tables = [
+        (path.relative_to(system.parent).as_posix(), path) for path in sorted(system.parent.rglob("*.rcs"))
+    ]
     scripts = [(f"scripts/{path.name}", path) for path in sorted(system.parent.glob("scripts/*.csv"))]
     cell = sources(Path(__file__).parents[1], "pictures")
-    return [("data", description(system).database), *scripts, *run_sources(), *cell]
+    return [("data", description(system).database), *scripts, *tables, *run_sources(), *cell]
 
 
 def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of physics alone

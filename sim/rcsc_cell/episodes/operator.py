@@ -7,6 +7,7 @@ that is changed is not taken up again: the script goes on with the next row when
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from rcsc.run.episodes.operator import CHANGED, EpisodeOperator, OrderLine
 from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.orders.numbered import NUMBERS, Latest
 from rcsc.run.signature import Leaf, Value, Values
@@ -18,19 +19,18 @@ ORDER, REPORT = "workstation.order", "task.to_workstation"
 
 
 @dataclass(slots=True)
-class Operator:
+class Operator(EpisodeOperator):
     """Stands outside the levels.
 
     Attributes:
         changes: What is to be sent yet: ticks, and rows, in order.
-        ends: What became of each row.
         sent: The order that stands in TASK's buffer; empty before the first.
         given: How many orders were sent.
     """
 
-    station: Workstation
-    changes: list[tuple[int, ScriptRow]]
-    ends: list[RowEnd] = field(default_factory=list)
+    lines: tuple[OrderLine, ...] = ()
+    station: Workstation = field(kw_only=True)
+    changes: list[tuple[int, ScriptRow]] = field(default_factory=list)
     sent: Values = ()
     given: int = 0
     _row: ScriptRow | None = None
@@ -87,10 +87,10 @@ class Operator:
     def _leave(self, tick: int) -> None:
         """Drop what was under way, which will not be answered."""
         if self._row is not None:
-            self.ends.append(RowEnd(self._row.number, self._row.text, "changed", "", tick - self._since))
+            self.ends.append(RowEnd(self._row.number, self._row.text, CHANGED, "", tick - self._since))
         elif not self.station.over and not self._alone and self._first >= 0:
             row, self._cut = self.station.rows[self.station.at], True
-            self.ends.append(RowEnd(row.number, row.text, "changed", "", tick - self._first))
+            self.ends.append(RowEnd(row.number, row.text, CHANGED, "", tick - self._first))
 
     def _wait(self, tick: int, row: ScriptRow, latest: Latest) -> None:
         report = latest(REPORT)

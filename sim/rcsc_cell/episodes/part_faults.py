@@ -47,7 +47,7 @@ def fault_classes(episode: Episode) -> tuple[str, ...]:
     """
     has = {
         *(fault.name for fault in episode.faults),
-        *(transport_spec.kind for transport_spec in episode.transport),
+        *(harm.kind for harm in episode.transport),
         *(("restarted",) if episode.restarts else ()),
         *(("changed command",) if episode.interruptions else ()),
         *(("pushed",) if episode.pushes else ()),

@@ -8,17 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
+from rcsc.run.episodes.episode import BufferFault, Harm, Restart
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import (
-    HARM,
-    Episode,
-    FaultSpec,
-    Interruption,
-    PartSpec,
-    Push,
-    Restart,
-    TransportSpec,
-)
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Push
 
 LEVELS = ("task", "emove", "vision", "primitive", "gripper")
 BUFFERS = (
@@ -39,7 +31,7 @@ BUFFERS = (
     "vision.to_camera",
     "camera.picture",
 )
-HARMS: tuple[HARM, ...] = ("lost", "doubled", "stale", "delayed")
+HARMS: tuple[Harm, ...] = ("lost", "doubled", "stale", "late")
 VALUES: Mapping[str, tuple[float, ...]] = {
     "joint_stuck": (1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
     "late_ticks": (1.0, 20.0, 95.0, 120.0),
@@ -165,8 +157,8 @@ def _harm(random: Random, episode: Episode) -> Episode:
     first = when(random, episode.rows)
     last = first + random.choice((0, 1, 3, 10, 40, 100))
     kind = random.choice(HARMS)
-    ticks = random.choice((1, 3, 8)) if kind == "delayed" else 3
-    spec = TransportSpec(random.choice(BUFFERS), kind, first, last, ticks)
+    ticks = random.choice((1, 3, 8)) if kind == "late" else 3
+    spec = BufferFault(random.choice(BUFFERS), kind, first, last, ticks)
     return replace(episode, transport=(*episode.transport, spec))
 
 

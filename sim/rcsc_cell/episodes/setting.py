@@ -8,10 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from rcsc.base.host.children import scratch
-from rcsc.run.description import Description, description
+from rcsc.run.episodes.stand import Stand, stand
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Signature
-from rcsc.run.system import signatures
 from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.ready import Lying
 from rcsc_cell.database.ask import Database
@@ -24,25 +23,22 @@ from rcsc_cell.workstation.script import ScriptRow, read_script
 from rcsc_cell.workstation.station import workstation
 
 
-def ready(system: Path) -> tuple[Description, dict[str, Signature], Database]:
-    """The description, the signatures and the database, read once while their files do not change.
+def ready(system: Path) -> tuple[Stand, Database]:
+    """The system with its database, read once while their files do not change.
 
     Raises:
         BadDescription, BadData: They are not in order.
     """
-    folder = system.parent.parent
-    files = [system, *sorted((folder / "generated" / "c").glob("*.json")), system.parent / "cell.toml"]
-    return _ready(system, tuple((str(file), file.stat().st_mtime_ns) for file in files if file.is_file()))
+    its = stand(system)
+    data = its.system.database
+    return its, _database(system, its.files, data.stat().st_mtime_ns if data.is_file() else 0)
 
 
 @lru_cache(maxsize=64)
-def _ready(
-    system: Path, _files: tuple[tuple[str, int], ...]
-) -> tuple[Description, dict[str, Signature], Database]:
-    described = description(system)
-    signs = signatures(described)
-    needs_cell(described, signs)
-    return described, signs, database_of(described, signs)
+def _database(system: Path, _files: tuple[tuple[str, int], ...], _time_ns: int) -> Database:
+    its = stand(system)
+    needs_cell(its.system, its.signs)
+    return database_of(its.system, its.signs)
 
 
 @lru_cache(maxsize=1024)
@@ -66,7 +62,7 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
         ValueError: An interruption is none of TASK's commands.
     """
     station = workstation(rows_of(episode.rows), database.locations, task)
-    operator = Operator(station, [])
+    operator = Operator(station=station)
     operator.changes = commands(episode.interruptions, operator)
     return operator
 

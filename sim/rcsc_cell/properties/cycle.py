@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
-from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.executors import Executor
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Value, Values
@@ -70,7 +69,6 @@ class CycleState:
         ran: The levels that ran.
         command: What TASK was last ordered; None before the first order.
         ended: `done` or `failed` in the cycle in which TASK first says so of this command.
-        row: A row of the script that ended in this cycle.
         active: Fault classes at work.
         last: When a fault class was last at work.
         restarted: Levels that lost their state before this cycle.
@@ -87,10 +85,9 @@ class CycleState:
     ran: tuple[RunningLevel, ...] = ()
     command: Command | None = None
     ended: str = ""
-    row: RowEnd | None = None
     active: frozenset[str] = frozenset()
     last: dict[str, int] = field(default_factory=dict)
-    restarted: tuple[str, ...] = ()
+    restarted: frozenset[str] = frozenset()
     harmed: frozenset[str] = frozenset()
     joints: Joints = ()
     opening_mm: float = 0.0

@@ -34,7 +34,7 @@ REASONS: Mapping[str, frozenset[str]] = {
     "lost": frozenset({"move", "loc", "pic", "robot", "grip"}),
     "doubled": frozenset({"move", "loc", "pic", "robot", "grip"}),
     "stale": frozenset({"move", "loc", "pic", "robot", "grip"}),
-    "delayed": frozenset({"move", "loc", "pic", "robot", "grip"}),
+    "late": frozenset({"move", "loc", "pic", "robot", "grip"}),
 }
 """Which reasons TASK may give because of a fault (Fig. 9: cmd, move, loc, pic, state, buf; RELEASE gives the reason of the level below)."""
 TAKES = frozenset({"acquire", "move", "transfer"})

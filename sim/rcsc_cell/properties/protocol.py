@@ -1,10 +1,9 @@
-"""Properties of levels and buffers: no STATE-TABLE error, every command ends once and in time, the log replays exactly."""
+"""Properties of levels that any system could have: every command ends in its time, and every cycle replays exactly."""
 
 from typing import ClassVar
 
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Signature, Values
-from rcsc_cell.cell.robot import REST_RAD
 from rcsc_cell.properties.cycle import Command, CycleState
 
 BOUND_TICKS = {"pause": 60, "acquire": 900, "move": 1100, "release": 500, "clear": 700, "transfer": 1500}
@@ -13,46 +12,6 @@ little more than half of these; what a table waits for has a limit there: ten se
 picture."""
 HARM_COSTS = 12
 """A cycle in which something happens to a buffer counts for so many times less: most of what levels say to each other waits for it."""
-
-STIRRED_TICKS = 10
-"""PAUSE says in every cycle whether everything below rests: for so long after a joint moved, though it is held, or after a fault, it
-may cease to be done, and be done again. A vise that closes on a part under the fingers moves the arm."""
-
-
-class NoStateTableError:
-    """Exactly one line of each table matches, and every input lies in its range."""
-
-    name: ClassVar[str] = "no state-table error"
-    place: ClassVar[str] = "section 8.1, line 16 of Fig. 8"
-
-    def __init__(self, _: CycleState) -> None:
-        pass
-
-    def watch(self, cycle: CycleState) -> str | None:
-        """Which level met which fault."""
-        for level in cycle.ran:
-            if level.fault:
-                return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
-        return None
-
-
-class AssumptionsHold:
-    """What the proofs take for granted and the executors check is so: a state and the command that it waits for are echoed together."""
-
-    name: ClassVar[str] = "assumptions hold"
-    place: ClassVar[str] = "section 9"
-
-    def __init__(self, _: CycleState) -> None:
-        pass
-
-    def watch(self, cycle: CycleState) -> str | None:
-        """Which assumptions failed, and where."""
-        for level in cycle.ran:
-            bits = int(level.values[-1])
-            if bits:
-                names = [name for at, name in enumerate(level.sign.monitored) if bits >> at & 1]
-                return f"level `{level.name}`, table `{level.table}`, line `{level.line}`: {', '.join(names)}"
-        return None
 
 
 class EndsInBound:
@@ -78,43 +37,6 @@ class EndsInBound:
         self._left -= 1
         late = self._left == 0
         return f"`{cycle.command.name}` has not ended" if late else None
-
-
-class AnsweredOnce:
-    """A command that is answered stays answered as it was, until the next comes: DONE does not become FAIL, nor FAIL anything."""
-
-    name: ClassVar[str] = "answered once"
-    place: ClassVar[str] = "sections 8.1 (lines 9 and 14 of Fig. 8) and 9"
-
-    def __init__(self, cycle: CycleState) -> None:
-        self._ended: tuple[int, str] | None = None
-        self._joints, self._stirred = cycle.joints, -STIRRED_TICKS
-
-    def watch(self, cycle: CycleState) -> str | None:
-        """What it was, and what it became."""
-        if (
-            cycle.active
-            or max(abs(a - b) for a, b in zip(self._joints, cycle.joints, strict=True)) > REST_RAD
-        ):
-            self._stirred = cycle.tick
-        self._joints = cycle.joints
-        if cycle.command is None:
-            return None
-        number = cycle.command.number
-        if cycle.ended:
-            self._ended = number, cycle.ended
-            return None
-        if self._ended is None or self._ended[0] != number or not cycle.number_answered:
-            return None
-        if "task" in cycle.restarted:  # it has forgotten, and says `restart`: the workstation must be told
-            self._ended = None
-            return None
-        if cycle.command.name == "pause" and self._stirred >= cycle.tick - STIRRED_TICKS:
-            return None
-        now = cycle.shown("task", "to_workstation.status_report")
-        if now != self._ended[1]:
-            return f"`{cycle.command.name}` was {self._ended[1]}, and is {now}"
-        return None
 
 
 class ReplaysExactly:
@@ -154,12 +76,6 @@ def _input_runs(sign: Signature) -> tuple[slice, ...]:
 
 
 def _difference(level: RunningLevel, now: Values) -> str:
-    leaves = [
-        *(leaf.name for leaf in level.sign.leaves),
-        "line",
-        "fault",
-        "fault_at",
-        "assumptions",
-    ]
+    leaves = [*(leaf.name for leaf in level.sign.leaves), *level.sign.trace]
     at = next(at for at, (a, b) in enumerate(zip(level.values, now, strict=True)) if a != b)
     return f"level `{level.name}`: {leaves[at]} was {level.values[at]}, and is {now[at]} the second time"
