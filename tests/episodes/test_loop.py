@@ -37,9 +37,9 @@ from rcsc_cell.episodes.episode import (
 )
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.episodes.part_faults import fault_classes
-from rcsc_cell.episodes.sampling import LEVELS, draw
+from rcsc_cell.episodes.sampling import draw
 from tests.support.loops import ACQUIRE, TBOX, keep
-from tests.support.strategies_episodes import episodes, harms
+from tests.support.strategies_episodes import LEVELS, episodes, harms
 
 HERE = Path(__file__).parents[1]
 LONG = settings.get_current_profile_name() == "long"

@@ -6,15 +6,14 @@ Small values come first, so that what fails shrinks to a nominal episode with th
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from rcsc.run.description import description
 from rcsc.run.episodes.episode import BufferFault, Restart
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Push
+from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Interruption, PartSpec, Push
 from rcsc_cell.episodes.sampling import (
-    BUFFERS,
     EMPTY_HAND,
     HARMS,
     KINDS,
-    LEVELS,
     MAKE_BOXT,
     NOT_LEGAL,
     SIZES,
@@ -22,6 +21,8 @@ from rcsc_cell.episodes.sampling import (
     VALUES,
 )
 
+LEVELS = tuple(level.name for level in description(SYSTEM).levels)
+BUFFERS = tuple(wire.source for wire in description(SYSTEM).wires)
 TICKS = st.integers(0, 600)
 LASTING = st.sampled_from((1, 2, 5, 20, 60, 200, 100_000))
 

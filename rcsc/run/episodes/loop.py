@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from rcsc.base.host.files.names import shown
 from rcsc.run.episodes.cycle import MOST_MESSAGE, Broken, Cycle
 from rcsc.run.episodes.episode import Episode, Reading
 from rcsc.run.episodes.explain import Explanations
@@ -94,18 +95,27 @@ def check(episode: Episode, system: Path) -> None:
     _checked(episode, stand(system))
 
 
+def check_names(episode: Episode, its: Stand) -> None:
+    """Hold the buffers and levels that an episode names against a system.
+
+    Raises:
+        ValueError: One is not there.
+    """
+    for harm in episode.harms:
+        if harm.buffer not in its.buffers:
+            raise ValueError(f"there is no buffer {shown(harm.buffer)}")
+    for restart in episode.restarts:
+        if restart.level not in its.signs:
+            raise ValueError(f"there is no level {shown(restart.level)}")
+
+
 def _checked(
     episode: Episode, its: Stand, around: Around | None = None
 ) -> tuple[Around, list[tuple[Field, Held]]]:
     if around is None:
         stage = staged(StageOrder(str(its.path), episode.plant, seed=episode.seed), its.system, its.signs)
         around = Around(stage, operator(its.served, episode.orders))
-    for name in (harm.buffer for harm in episode.harms):
-        if name not in its.buffers:
-            raise ValueError(f"there is no buffer `{name}`")
-    for name in (restart.level for restart in episode.restarts):
-        if name not in its.signs:
-            raise ValueError(f"there is no level `{name}`")
+    check_names(episode, its)
     known = faults_of(around.stage.outside)
     switched = (one.fault for one in episode.switches)
     for name in (*switched, *(fault for order in episode.orders for fault in order.faults)):

@@ -28,7 +28,7 @@ def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa
     """
     for backend in get_args(Backend):
         if plant == backend:
-            return draw(seed, backend)
+            return draw(seed, backend, system)
     raise BadDescription(
         f"episodes of the cell are of plants {' and '.join(get_args(Backend))}, not {shown(plant)}"
     )
@@ -49,15 +49,10 @@ def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG0
     Raises:
         ValueError: A level, or a buffer.
     """
-    described = description(system)
-    levels = {level.name for level in described.levels}
-    for restart in episode.restarts:
-        if restart.level not in levels:
-            raise ValueError(f"there is no level {shown(restart.level)} to start again")
-    buffers = {wire.source for wire in described.wires}
-    for harm in episode.transport:
-        if harm.buffer not in buffers:
-            raise ValueError(f"there is no buffer {shown(harm.buffer)}")
+    from rcsc.run.episodes.loop import check_names  # these load the language, as a run does
+    from rcsc.run.episodes.stand import stand
+
+    check_names(episode.in_any_system(), stand(system))
     return episode
 
 

@@ -11,6 +11,7 @@ from rcsc.run.episodes import loop
 from rcsc.run.episodes.cycle import Broken, Cycle
 from rcsc.run.episodes.operator import CHANGED
 from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.orders.roles import field_of
 from rcsc.run.orders.script import BadScript
 from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Values
@@ -24,6 +25,8 @@ from rcsc_cell.episodes.setting import operator_of, ready
 from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
 
+NUMBERS = ("inc_command", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector")
+"""Fields of TASK's orders that are no words."""
 MOST_TICKS_A_ROW = 2500
 """A run is given up after so many ticks for each row."""
 USUAL: Mapping[str, float] = {switch.name: getattr(Faults(), switch.name) for switch in fields(Faults)}
@@ -65,19 +68,26 @@ class Loop(loop.Loop):
         super().__init__(episode.in_any_system(), its, around=around)
         if self.refused:
             self._end = "refused"
-        self.state = CycleState(
-            self.database,
-            self.plant,
-            self.cycle.levels,
-            self.executors(),
-            tuple(part.body for part in lying),
+        seen = self.cycle
+        self.cycle = self.state = CycleState(
+            seen.levels,
+            seen.plants,
+            seen.operator,
+            seen.said,
+            seen.before,
+            seen.left,
+            database=self.database,
+            plant=self.plant,
+            twins=self.executors(),
+            bodies=tuple(part.body for part in lying),
         )
         self.state.look()
         self.properties = [make(self.state) for make in properties]
         self.watching.append(self)
         latest = max((interruption.tick for interruption in episode.interruptions), default=0)
         self._most = latest + MOST_TICKS_A_ROW * (len(episode.rows) + len(episode.interruptions) + 1)
-        self._given, self._answered, self._taken = 0, True, True
+        self._sent: Values = ()
+        self._answered = self._taken = True
 
     def step(self) -> None:
         """One tick."""
@@ -135,12 +145,6 @@ class Loop(loop.Loop):
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """What the cell's properties say of this cycle."""
         state = self.state
-        state.tick, state.ran, state.before, state.restarted = (
-            cycle.tick,
-            cycle.ran,
-            dict(cycle.left),
-            cycle.restarted,
-        )
         self._note(cycle.tick - 1)
         state.look()
         self._command()
@@ -153,9 +157,10 @@ class Loop(loop.Loop):
         """The command under way, and whether it has ended."""
         state = self.state
         state.ended = ""
-        if self.orders.given != self._given:
-            self._given, self._answered, self._taken = self.orders.given, False, False
-            state.command = self._ordered(self.orders.sent)
+        sent = self.orders.station.task.sent
+        if sent != self._sent:
+            self._sent, self._answered, self._taken = sent, False, False
+            state.command = self._ordered(sent)
         if state.command is not None and not self._taken:
             self._take(state.command)
         if not self._answered and state.number_answered:
@@ -165,7 +170,7 @@ class Loop(loop.Loop):
 
     def _take(self, command: Command) -> None:
         """What TASK believed when it saw the command."""
-        task, before = self.system.level("task"), self.state.before["task"]
+        task, before = self.system.level("task"), self.state.left["task"]
         if task.value("inc_command_seen") != command.number:
             return
         index, leaves = task.sign.index, task.sign.leaves
@@ -175,27 +180,18 @@ class Loop(loop.Loop):
 
     def _ordered(self, sent: Values) -> Command:
         state = self.state
-        leaves = {
-            leaf.name.rpartition(".")[2]: (leaf, value)
-            for leaf, value in zip(self.orders.station.order, sent, strict=True)
-        }
-
-        def number(name: str) -> int:
-            return int(leaves[name][1])
-
-        def word(name: str) -> str:
-            leaf, value = leaves[name]
-            return leaf.shown(value)
-
+        given = zip(self.orders.station.order, sent, strict=True)
+        words = {field_of(leaf): (value, leaf.shown(value)) for leaf, value in given}
+        number, grasp, source, dest, end_at, sector = (int(words[name][0]) for name in NUMBERS)
         return Command(
-            number("inc_command"),
-            word("input_command"),
-            word("obj"),
-            number("grasp"),
-            number("source_locpt"),
-            number("dest_locpt"),
-            number("end_at_locpt"),
-            number("sector"),
+            number,
+            words["input_command"][1],
+            words["obj"][1],
+            grasp,
+            source,
+            dest,
+            end_at,
+            sector,
             state.tick,
             state.shown("task", "obj_now_in_gripper"),
             int(state.value("task", "current_loc")),

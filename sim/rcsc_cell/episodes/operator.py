@@ -9,13 +9,11 @@ from dataclasses import dataclass, field, replace
 
 from rcsc.run.episodes.operator import CHANGED, EpisodeOperator, OrderLine
 from rcsc.run.episodes.outcome import RowEnd
-from rcsc.run.orders.numbered import NUMBERS, Latest
-from rcsc.run.signature import Leaf, Value, Values
-from rcsc_cell.workstation.interlocks import CellState, after
+from rcsc.run.orders.numbered import Latest
+from rcsc.run.signature import Value, Values
+from rcsc_cell.workstation.interlocks import after
 from rcsc_cell.workstation.script import ScriptRow
-from rcsc_cell.workstation.station import Workstation
-
-ORDER, REPORT = "workstation.order", "task.to_workstation"
+from rcsc_cell.workstation.station import IN_GRIPPER, Workstation
 
 
 @dataclass(slots=True)
@@ -24,15 +22,11 @@ class Operator(EpisodeOperator):
 
     Attributes:
         changes: What is to be sent yet: ticks, and rows, in order.
-        sent: The order that stands in TASK's buffer; empty before the first.
-        given: How many orders were sent.
     """
 
     lines: tuple[OrderLine, ...] = ()
     station: Workstation = field(kw_only=True)
     changes: list[tuple[int, ScriptRow]] = field(default_factory=list)
-    sent: Values = ()
-    given: int = 0
     _row: ScriptRow | None = None
     _since: int = 0
     _known: int = 0
@@ -50,27 +44,21 @@ class Operator(EpisodeOperator):
         """One tick."""
         if self.changes and self.changes[0][0] <= tick:
             self._change(tick, self.changes.pop(0)[1], latest)
-            return {ORDER: self.sent}
-        if self._row is not None:
+        elif self._row is not None:
             self._wait(tick, self._row, latest)
-            return {ORDER: self.sent}  # again: a buffer may have been lost
-        return {} if self._alone else self._go_on(tick, latest)
+        else:
+            return {} if self._alone else self._go_on(tick, latest)
+        return {self.station.task.order: self.station.task.sent}  # again: a buffer may have been lost
 
     # --- the script ---
 
     def _go_on(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         if self._first < 0:
             self._first = tick
-        given = self.station.step(
-            tick, lambda name: self.sent or latest(name) if name == ORDER else latest(name)
-        )
-        order = given.get(ORDER, ())
-        if order and order != self.sent:
-            self.sent, self.given = order, self.given + 1
+        given = self.station.step(tick, latest)
         for result in self.station.results[self._known :]:
-            self.ends.append(
-                RowEnd(result.row.number, result.row.text, result.state, result.reason, result.ticks)
-            )
+            row = result.row
+            self.ends.append(RowEnd(row.number, row.text, result.state, result.reason, result.ticks))
             self._first = tick
         self._known = len(self.station.results)
         return given
@@ -79,9 +67,8 @@ class Operator(EpisodeOperator):
 
     def _change(self, tick: int, row: ScriptRow, latest: Latest) -> None:
         self._leave(tick)
-        number = int(self.sent[_number_at(self.station.order)]) if self.sent else _echoed(latest)
-        self.sent = order(self.station, row, (number + 1) % NUMBERS)
-        self.given += 1
+        self.station.task.catch_up(latest)
+        self.station.task.send(commanded(self.station, row))
         self._row, self._since = row, tick
 
     def _leave(self, tick: int) -> None:
@@ -93,74 +80,38 @@ class Operator(EpisodeOperator):
             self.ends.append(RowEnd(row.number, row.text, CHANGED, "", tick - self._first))
 
     def _wait(self, tick: int, row: ScriptRow, latest: Latest) -> None:
-        report = latest(REPORT)
-        words = {_last(leaf): leaf for leaf in self.station.report}
-        places = {_last(leaf): at for at, leaf in enumerate(self.station.report)}
-        number = self.sent[_number_at(self.station.order)]
-        if report is None or report[places["inc_command_echo"]] != number:
+        report = self.station.task.answer(latest)
+        status = "" if report is None else self.station.word(report, "status_report")
+        if report is None or status == "executing":
             return
-        status = words["status_report"].shown(report[places["status_report"]])
-        if status == "executing":
-            return
-        reason = words["failure"].shown(report[places["failure"]]) if status == "failed" else ""
+        reason = self.station.word(report, "failure") if status == "failed" else ""
         self.ends.append(RowEnd(row.number, row.text, status, reason, tick - self._since))
         self._row = None
-        holds = words["status_parameter"].shown(report[places["status_parameter"]])
+        holds = self.station.word(report, IN_GRIPPER)
         self._resume(tick, row, status, "" if holds == "null_obj" else holds)
 
     def _resume(self, tick: int, row: ScriptRow, status: str, holds: str) -> None:
         """Continue the script after the row that was changed, with what TASK reports of the hand."""
-        if self._alone or self.station.over or status != "done":
+        before = self.station
+        if self._alone or before.over or status != "done":
             self._alone = True
             return
-        at = self.station.at
-        under_way = self.station.rows[at]
-        cell = after(self.station.cell, under_way) if under_way.vise and self._cut else self.station.cell
-        where = row.end_at or row.dest or row.source or cell.robot_at
-        rest = self.station.rows[at + self._cut :]
-        # A new one: it takes up the numbers of the orders where they are, and the rows where they are left.
-        self.station = replace_rows(self.station, rest, replace(cell, held=holds, robot_at=where))
+        under_way = before.rows[before.at]
+        cell = after(before.cell, under_way) if under_way.vise and self._cut else before.cell
+        cell = replace(cell, held=holds, robot_at=row.end_at or row.dest or row.source or cell.robot_at)
+        rest = before.rows[before.at + self._cut :]
+        # A new one takes up the rows where they are left, and of the orders those to TASK.
+        self.station = Workstation(rest, before.locations, before.order, before.report, cell)
+        self.station.task = before.task
         self._known, self._first, self._cut = 0, tick, False
 
 
-def replace_rows(station: Workstation, rows: tuple[ScriptRow, ...], cell: CellState) -> Workstation:
-    """A workstation that has sent nothing yet, and believes this of the cell."""
-    return Workstation(rows, station.locations, station.order, station.report, cell)
-
-
-def order(station: Workstation, row: ScriptRow, number: int) -> Values:
-    """A row as TASK's order.
+def commanded(station: Workstation, row: ScriptRow) -> tuple[Value, ...]:
+    """A row as TASK's order, without its number.
 
     Raises:
         ValueError: It is none of TASK's.
     """
     if not row.robot:
         raise ValueError(f"`{row.text}` is no command of TASK's")
-    values: dict[str, Value | str] = {
-        "inc_command": number,
-        "input_command": row.robot,
-        "obj": row.part or "null_obj",
-        "grasp": row.grasp,
-        "source_locpt": station.locations.get(row.source, 0),
-        "dest_locpt": station.locations.get(row.dest, 0),
-        "end_at_locpt": station.locations.get(row.end_at, 0),
-        "sector": row.sector,
-    }
-    return tuple(_value(leaf, values[_last(leaf)]) for leaf in station.order)
-
-
-def _value(leaf: Leaf, value: Value | str) -> Value:
-    return leaf.members.index(value) if isinstance(value, str) else value
-
-
-def _last(leaf: Leaf) -> str:
-    return leaf.name.rpartition(".")[2]
-
-
-def _number_at(leaves: tuple[Leaf, ...]) -> int:
-    return next(at for at, leaf in enumerate(leaves) if _last(leaf) == "inc_command")
-
-
-def _echoed(latest: Latest) -> int:
-    report = latest(REPORT)
-    return 0 if report is None else int(report[0])
+    return station.order_of(row.robot, row)

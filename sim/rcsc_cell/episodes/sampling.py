@@ -5,32 +5,17 @@ legal. With physics only scripts that keep a held part clear of the furniture: c
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import lru_cache
+from pathlib import Path
 from random import Random
 
+from rcsc.run.description import Description, description
 from rcsc.run.episodes.episode import BufferFault, Harm, Restart
+from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec, Push
+from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Interruption, PartSpec, Push
 
-LEVELS = ("task", "emove", "vision", "primitive", "gripper")
-BUFFERS = (
-    "workstation.order",
-    "task.to_workstation",
-    "task.to_emove",
-    "emove.to_task",
-    "emove.to_primitive",
-    "primitive.to_emove",
-    "emove.to_vision",
-    "vision.to_emove",
-    "primitive.to_robot",
-    "robot.report",
-    "primitive.to_gripper",
-    "gripper.to_primitive",
-    "gripper.to_hand",
-    "hand.report",
-    "vision.to_camera",
-    "camera.picture",
-)
 HARMS: tuple[Harm, ...] = ("lost", "doubled", "stale", "late")
 VALUES: Mapping[str, tuple[float, ...]] = {
     "joint_stuck": (1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
@@ -38,10 +23,7 @@ VALUES: Mapping[str, tuple[float, ...]] = {
     "shifted_mm": (-30.0, -5.0, 2.0, 5.0, 30.0),
 }
 """What switches that are no yes or no are set to; late pictures on both sides of the four seconds that are waited for."""
-SWITCHES = (
-    "robot_stuck", "joint_stuck", "robot_refuses", "unreadable", "hand_stuck", "hand_weak", "jammed", "slips", "drops",
-    "blind", "dark", "late_ticks", "noisy", "shifted_mm", "tilted", "vise_stuck", "vise_weak", "vise_mute",
-)  # fmt: skip
+SWITCHES = tuple(switch.name for switch in fields(Faults))
 KINDS = {"tbox": "BOXT", "bbox": "BOXB", "flag": "FLAG", "hous": "HOUS"}
 SIZES: Mapping[str, tuple[float, float, float]] = {
     "tbox": (80.0, 60.0, 40.0),
@@ -86,16 +68,26 @@ ONLY_WITHOUT_PHYSICS = (
 )
 
 
-def draw(seed: int, backend: Backend = "kinematic") -> Episode:
-    """The episode of a seed."""
+def draw(seed: int, backend: Backend = "kinematic", system: Path = SYSTEM) -> Episode:
+    """The episode of a seed.
+
+    Raises:
+        BadDescription: The system is not in order.
+    """
+    described = _described(system, system.stat().st_mtime_ns if system.is_file() else 0)
     random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
     kind = random.choice(tuple(KINDS))
     episode = Episode(backend, "c", seed, _parts(random, kind), _script(random, kind, backend))
     if random.random() < 0.2:
         return episode
     for _ in range(1 if random.random() < 0.6 else random.randint(2, 4)):
-        episode = random.choice(INJECTIONS)(random, episode)
+        episode = random.choice(INJECTIONS)(random, described, episode)
     return episode
+
+
+@lru_cache(maxsize=8)
+def _described(system: Path, _time_ns: int) -> Description:
+    return description(system)
 
 
 # --- parts and scripts ---
@@ -145,7 +137,7 @@ def lasting(random: Random) -> int:
     return random.choice((1, 2, 5, 20, 60, 200, 100_000))
 
 
-def _switch(random: Random, episode: Episode) -> Episode:
+def _switch(random: Random, _: Description, episode: Episode) -> Episode:
     name, first = random.choice(SWITCHES), when(random, episode.rows)
     value = random.choice(VALUES.get(name, (1.0,)))
     return replace(
@@ -153,35 +145,36 @@ def _switch(random: Random, episode: Episode) -> Episode:
     )
 
 
-def _harm(random: Random, episode: Episode) -> Episode:
+def _harm(random: Random, its: Description, episode: Episode) -> Episode:
     first = when(random, episode.rows)
     last = first + random.choice((0, 1, 3, 10, 40, 100))
     kind = random.choice(HARMS)
     ticks = random.choice((1, 3, 8)) if kind == "late" else 3
-    spec = BufferFault(random.choice(BUFFERS), kind, first, last, ticks)
+    wire = random.choice(its.wires)
+    spec = BufferFault(wire.source, kind, first, last, ticks)
     return replace(episode, transport=(*episode.transport, spec))
 
 
-def _restart(random: Random, episode: Episode) -> Episode:
-    restart = Restart(when(random, episode.rows), random.choice(LEVELS))
+def _restart(random: Random, its: Description, episode: Episode) -> Episode:
+    restart = Restart(when(random, episode.rows), random.choice(its.levels).name)
     return replace(episode, restarts=(*episode.restarts, restart))
 
 
-def _interruption(random: Random, episode: Episode) -> Episode:
+def _interruption(random: Random, _: Description, episode: Episode) -> Episode:
     rows = (*EMPTY_HAND, "PAUSE,,,,", *NOT_LEGAL[:2])
     interruption = Interruption(when(random, episode.rows), random.choice(rows))
     return replace(episode, interruptions=(*episode.interruptions, interruption))
 
 
-def _push(random: Random, episode: Episode) -> Episode:
+def _push(random: Random, its: Description, episode: Episode) -> Episode:
     if episode.backend != "kinematic" or not episode.parts:
-        return _switch(random, episode)
+        return _switch(random, its, episode)
     x_mm, y_mm = (random.choice((-40.0, -5.0, 0.0, 5.0, 40.0)) for _ in range(2))
     push = Push(when(random, episode.rows), random.randrange(len(episode.parts)), x_mm, y_mm)
     return replace(episode, pushes=(*episode.pushes, push))
 
 
-def _other_parts(random: Random, episode: Episode) -> Episode:
+def _other_parts(random: Random, _: Description, episode: Episode) -> Episode:
     first = episode.parts[0] if episode.parts else place(random, "tbox")
     return replace(episode, parts=random.choice((_none, _another, _two, _sized, _weighing))(random, first))
 
@@ -214,7 +207,7 @@ def _weighing(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
     return (replace(part, density_kg_m3=density, friction=friction),)
 
 
-INJECTIONS: tuple[Callable[[Random, Episode], Episode], ...] = (
+INJECTIONS: tuple[Callable[[Random, Description, Episode], Episode], ...] = (
     _switch,
     _switch,
     _switch,

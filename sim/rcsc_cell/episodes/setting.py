@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
-from rcsc.base.host.children import scratch
+from rcsc.base.host.files.read import Malformed
 from rcsc.run.episodes.stand import Stand, stand
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Signature
@@ -17,9 +17,9 @@ from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import BadData
 from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.episode import Episode, Interruption, PartSpec, script
-from rcsc_cell.episodes.operator import Operator, order
+from rcsc_cell.episodes.operator import Operator, commanded
 from rcsc_cell.workstation.prepared import database_of, needs_cell
-from rcsc_cell.workstation.script import ScriptRow, read_script
+from rcsc_cell.workstation.script import ScriptRow, script_rows
 from rcsc_cell.workstation.station import workstation
 
 
@@ -48,10 +48,10 @@ def rows_of(rows: tuple[str, ...]) -> tuple[ScriptRow, ...]:
     Raises:
         BadScript: One says nothing that a workstation can do.
     """
-    with scratch("rows") as folder:
-        path = folder / "rows.csv"
-        path.write_text(script(rows), encoding="utf-8")
-        return read_script(path)
+    try:
+        return script_rows(script(rows), "the episode")
+    except Malformed as error:
+        raise BadScript(f"the episode: {error}") from error
 
 
 def operator_of(episode: Episode, database: Database, task: Signature) -> Operator:
@@ -75,7 +75,7 @@ def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[
         for name in (row.source, row.dest, row.end_at):
             if name and name not in operator.station.locations:
                 raise BadScript(f"no location is called `{name}`")
-        order(operator.station, row, 0)
+        commanded(operator.station, row)
         timed_rows.append((change.tick, row))
     return timed_rows
 

@@ -1,16 +1,16 @@
 """What a property sees: the system after a cycle, the cell as it is in truth, and the command under way.
 
-In: a running system and its plant. Out: a `CycleState`, made anew in every tick by `rcsc_cell.episodes.loop`. Truth (where parts are, what
-touches what) is for those who judge a run alone; nothing of it reaches a level.
+In: a running system and its plant. Out: a `CycleState`, which `rcsc_cell.episodes.loop` changes in every tick. Truth (where parts are,
+what touches what) is for those who judge a run alone; nothing of it reaches a level.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
+from rcsc.run.episodes.cycle import Cycle
 from rcsc.run.executors import Executor
-from rcsc.run.levels import RunningLevel
-from rcsc.run.signature import Value, Values
+from rcsc.run.signature import Value
 from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.plant import Plant
@@ -56,38 +56,28 @@ class Command:
     here: int
 
 
-@dataclass(slots=True)
-class CycleState:
-    """The state after a cycle.
+@dataclass(slots=True, kw_only=True)
+class CycleState(Cycle):
+    """The state after a cycle, with the cell as it is.
 
     Attributes:
         bodies: Of the parts, as they were at first.
-        tick: Of the cycle that has just been done.
-        levels: By name, from the top.
         twins: A second executor of each, for whoever wants to run a cycle again.
-        before: What each level stood at before the cycle, by name.
-        ran: The levels that ran.
         command: What TASK was last ordered; None before the first order.
         ended: `done` or `failed` in the cycle in which TASK first says so of this command.
         active: Fault classes at work.
         last: When a fault class was last at work.
-        restarted: Levels that lost their state before this cycle.
         harmed: Buffers that something happens to in this cycle.
     """
 
     database: Database
     plant: Plant
-    levels: Mapping[str, RunningLevel]
     twins: Mapping[str, Executor]
     bodies: tuple[Body, ...]
-    tick: int = 0
-    before: Mapping[str, Values] = field(default_factory=dict)
-    ran: tuple[RunningLevel, ...] = ()
     command: Command | None = None
     ended: str = ""
     active: frozenset[str] = frozenset()
     last: dict[str, int] = field(default_factory=dict)
-    restarted: frozenset[str] = frozenset()
     harmed: frozenset[str] = frozenset()
     joints: Joints = ()
     opening_mm: float = 0.0

@@ -52,7 +52,7 @@ class ReplaysExactly:
         """The first leaf that differs."""
         for level in cycle.ran:
             twin, count = cycle.twins[level.name], len(level.sign.leaves)
-            start = list(cycle.before[level.name][:count])
+            start = list(cycle.left[level.name][:count])
             for run in self._inputs[level.name]:
                 start[run] = level.values[run]
             twin.put(0, start)

@@ -49,17 +49,27 @@ def read_script(path: Path) -> tuple[ScriptRow, ...]:
         BadScript: The file cannot be read, or a row says nothing that a workstation can do.
     """
     try:
-        lines = rows_of(text(path, MIB), COLUMNS)
+        return script_rows(text(path, MIB), f"{path}")
     except OSError as error:
         raise BadScript(f"{path} cannot be read: {error.strerror}") from error
     except Malformed as error:
         raise BadScript(f"{path}: {error}") from error
+
+
+def script_rows(said: str, where: str) -> tuple[ScriptRow, ...]:
+    """The rows of a script's text; `where` names it in what is said of it.
+
+    Raises:
+        BadScript: A row says nothing that a workstation can do.
+        Malformed: It has other columns.
+    """
+    lines = rows_of(said, COLUMNS)
     rows, wrong = [], []
     for number, line in enumerate(lines, 1):
         try:
             rows.append(_row(number, {key: value.strip() for key, value in line.items()}))
         except ValueError as error:
-            wrong.append(f"{path}, row {number}: {error}")
+            wrong.append(f"{where}, row {number}: {error}")
     if wrong:
         raise BadScript("\n".join(wrong))
     return tuple(rows)

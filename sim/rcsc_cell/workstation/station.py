@@ -73,6 +73,7 @@ class Workstation:
         trouble: Why TASK did not pause after a failure; empty when it did.
         progress: How far the row under way has come, over all its tries.
         safe: The safe location of each that has one.
+        task: The order that stands in TASK's buffer.
     """
 
     rows: tuple[ScriptRow, ...]
@@ -85,7 +86,7 @@ class Workstation:
     trouble: str = ""
     progress: Progress = field(default_factory=Progress)
     safe: Mapping[str, str] = field(default_factory=dict)
-    _task: Orders = field(init=False)
+    task: Orders = field(init=False)
     _vise: Orders = field(default_factory=lambda: Orders(VISE_ORDER, VISE_REPORT))
     _machine: Orders = field(default_factory=lambda: Orders(MACHINE_ORDER, MACHINE_REPORT))
     _since: int = -1  # the tick at which the row began
@@ -93,7 +94,7 @@ class Workstation:
 
     def __post_init__(self) -> None:
         """Finds the numbers in TASK's buffers."""
-        self._task = Orders(
+        self.task = Orders(
             "workstation.order",
             "task.to_workstation",
             _place(self.report, "inc_command_echo"),
@@ -102,7 +103,7 @@ class Workstation:
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """One tick: begin a row, wait for it, or rest."""
-        lines = (self._task, self._vise, self._machine)
+        lines = (self.task, self._vise, self._machine)
         for line in lines:
             line.catch_up(latest)
         if self._paused >= 0:
@@ -199,8 +200,8 @@ class Workstation:
 
     def _left(self, row: ScriptRow, latest: Latest) -> ScriptRow:
         """What is to be done of a row for TASK: all of it, or the rest."""
-        report = latest(self._task.report)
-        held = NOTHING if report is None else self._word(report, IN_GRIPPER)
+        report = latest(self.task.report)
+        held = NOTHING if report is None else self.word(report, IN_GRIPPER)
         return rest(row, self.progress, held, self.safe)
 
     def _end(self, row: ScriptRow, tick: int, state: State, reason: str) -> None:
@@ -215,10 +216,10 @@ class Workstation:
 
     def _await_pause(self, tick: int, latest: Latest) -> None:
         """Wait until TASK has paused: an order could disturb one that it still carries out."""
-        report = self._task.answer(latest)
-        status = "" if report is None else self._word(report, "status_report")
+        report = self.task.answer(latest)
+        status = "" if report is None else self.word(report, "status_report")
         if report is not None and status == "failed":
-            self._paused, self.trouble = -1, f"TASK does not pause: {self._word(report, 'failure')}"
+            self._paused, self.trouble = -1, f"TASK does not pause: {self.word(report, 'failure')}"
         elif status == "done":
             self._paused, self.trouble = -1, ""
         elif tick - self._paused >= PAUSE_TICKS:
@@ -234,19 +235,19 @@ class Workstation:
         return self._task_now(row, latest)
 
     def _task_now(self, row: ScriptRow, latest: Latest) -> Now:
-        report = self._task.answer(latest)
+        report = self.task.answer(latest)
         if report is None:
             return RUNNING
-        self.progress.seen(self._word(report, IN_GRIPPER))
-        match self._word(report, "status_report"):
+        self.progress.seen(self.word(report, IN_GRIPPER))
+        match self.word(report, "status_report"):
             case "done":
                 return "done", ""
             case "failed":
-                failure = self._word(report, "failure")
-                held = self._word(report, IN_GRIPPER)
+                failure = self.word(report, "failure")
+                held = self.word(report, IN_GRIPPER)
                 self.progress.failed(row, held, failure)
                 self.cell = stands(row, self.progress, held, self.cell)
-                return "failed", _reason(failure, self._word(report, "cause"))
+                return "failed", _reason(failure, self.word(report, "cause"))
             case _:
                 return RUNNING
 
@@ -272,6 +273,10 @@ class Workstation:
         return row.vise.get("right", self.cell.right_open), row.vise.get("left", self.cell.left_open)
 
     def _tell(self, command: str, row: ScriptRow) -> None:
+        self.task.send(self.order_of(command, row))
+
+    def order_of(self, command: str, row: ScriptRow) -> tuple[Value, ...]:
+        """A command of TASK's with what a row says of it, as an order without its number."""
         values: dict[str, Value | str] = {
             "input_command": command,
             "obj": row.part or "null_obj",
@@ -281,9 +286,10 @@ class Workstation:
             "end_at_locpt": self.locations.get(row.end_at, 0),
             "sector": row.sector,
         }
-        self._task.send([_value(leaf, values[_last(leaf)]) for leaf in self.order if _last(leaf) != NUMBER])
+        return tuple(_value(leaf, values[_last(leaf)]) for leaf in self.order if _last(leaf) != NUMBER)
 
-    def _word(self, report: Values, name: str) -> str:
+    def word(self, report: Values, name: str) -> str:
+        """A field of TASK's report in the words of the tables."""
         at = _place(self.report, name)
         return self.report[at].shown(report[at])
 
