@@ -17,7 +17,7 @@ Nothing here is trusted for a proof. A run shows what the proofs are about, and 
 that slips, a joint at its limit, a report that is not true.
 
 Rooms, in the order the data flows: `database` (places, routes, parts), `workstation` (scripts, interlocks), `vision`
-(pictures and what is made of them), `cell` (arm, fixtures, mechanism), `properties` (what is to hold), `pictures`,
-`pages` and `live` (what people look at), `bound` (any model for MuJoCo as a plant), `episodes` (one run with whatever
-goes wrong in it; `rcsc.run.campaign` plays many).
+(pictures and what is made of them), `cell` (arm, fixtures, mechanism), `properties` (what is to hold of the cell),
+`pictures` (what people look at), `episodes` (one run with whatever goes wrong in it, as those of any system;
+`rcsc.run.campaign` plays many).
 """

@@ -292,6 +292,15 @@ def test_a_value_that_was_held_up_arrives_though_nothing_follows() -> None:
     assert buffers.latest("c") == (1,)
 
 
+def test_a_switch_has_the_value_of_its_window() -> None:
+    windows = (FaultSpec("shifted_mm", 2, 3, 5.0), FaultSpec("shifted_mm", 4, 4, 30.0))
+    loop, seen = Loop(Episode(faults=windows), SYSTEM), []
+    for _ in range(6):
+        loop.step()
+        seen.append(loop.plant.faults.shifted_mm)
+    assert seen == [0.0, 0.0, 5.0, 5.0, 30.0, 0.0]
+
+
 def test_parts_lie_where_they_are_said_to() -> None:
     spec = PartSpec("flag", "pallet", 10.0, 0.0, 0.0, (50.0, 30.0, 25.0))
     loop = Loop(Episode(parts=(spec,), pushes=(Push(0, 0, 3.0, 4.0),)), SYSTEM)

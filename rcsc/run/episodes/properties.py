@@ -100,28 +100,23 @@ class LevelProperty:
     property: model.Property
     now: Mapping[str, int]
     before: Mapping[str, int]
-    held: Values | None = None
+    held: list[Value] | None = None
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """The values on which it does not hold; what a refused cycle left of inputs alone breaks nothing."""
         level = cycle.levels[self.level]
         if level not in cycle.ran or level.fault:
             return
-        left, taken = cycle.left[self.level], cycle.before[self.level]
-        read = (
-            *(level.values[at] for at in self.now.values()),
-            *(left[at] for at in self.before.values()),
-        )
+        values, left, taken = level.values, cycle.left[self.level], cycle.before[self.level]
+        read = [*(values[at] for at in self.now.values()), *(left[at] for at in self.before.values())]
         if read == self.held:
             return
-        what = self._wrong(level.values, left)
-        if what is None or (
-            left != taken and self._wrong(level.values, _inputs_of(level, taken, left)) is None
-        ):
+        what = self._wrong(values, left)
+        if what is None or (left != taken and self._wrong(values, _inputs_of(level, taken, left)) is None):
             self.held = read if what is None else None
             return
         leaves = level.sign.leaves
-        words = [f"`{name}` = {leaves[at].shown(level.values[at])}" for name, at in self.now.items()]
+        words = [f"`{name}` = {leaves[at].shown(values[at])}" for name, at in self.now.items()]
         words += [f"`{name}` = {leaves[at].shown(left[at])}" for name, at in self.before.items()]
         where = level.ran if level.level.stages else f"line `{level.line}`"
         text = f"`{self.property.text}` is false in {where}: {what}{', '.join(words)}"

@@ -86,6 +86,7 @@ class Loop(loop.Loop):
         self.watching.append(self)
         latest = max((interruption.tick for interruption in episode.interruptions), default=0)
         self._most = latest + MOST_TICKS_A_ROW * (len(episode.rows) + len(episode.interruptions) + 1)
+        self._set: dict[str, float] = {}
         self._sent: Values = ()
         self._answered = self._taken = True
 
@@ -122,10 +123,10 @@ class Loop(loop.Loop):
             for fault in self.in_cell.faults
             if fault.first_tick <= tick <= fault.last_tick
         }
-        if self._on != wanted.keys():
+        if wanted != self._set:
             for name, usual in USUAL.items():
                 setattr(self.plant.faults, name, type(usual)(wanted.get(name, usual)))
-        self._on = frozenset(wanted)
+        self._on, self._set = frozenset(wanted), wanted
 
     def _note(self, tick: int) -> None:
         """Which fault classes are at work in this tick."""

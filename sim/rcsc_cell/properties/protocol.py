@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from rcsc.run.levels import RunningLevel
-from rcsc.run.signature import Signature, Values
+from rcsc.run.signature import Values
 from rcsc_cell.properties.cycle import Command, CycleState
 
 BOUND_TICKS = {"pause": 60, "acquire": 900, "move": 1100, "release": 500, "clear": 700, "transfer": 1500}
@@ -46,33 +46,25 @@ class ReplaysExactly:
     place: ClassVar[str] = "section 10: a log of the machine state, to be stepped"
 
     def __init__(self, cycle: CycleState) -> None:
-        self._inputs = {level.name: _input_runs(level.sign) for level in cycle.levels.values()}
+        self._inputs = {
+            level.name: [at for at, leaf in enumerate(level.sign.leaves) if leaf.kind == "input"]
+            for level in cycle.levels.values()
+        }
 
     def watch(self, cycle: CycleState) -> str | None:
         """The first leaf that differs."""
         for level in cycle.ran:
             twin, count = cycle.twins[level.name], len(level.sign.leaves)
             start = list(cycle.left[level.name][:count])
-            for run in self._inputs[level.name]:
-                start[run] = level.values[run]
+            values = level.values
+            for at in self._inputs[level.name]:
+                start[at] = values[at]
             twin.put(0, start)
             twin.cycle()
             now = twin.values()
-            if now != level.values:
+            if now != values:
                 return _difference(level, now)
         return None
-
-
-def _input_runs(sign: Signature) -> tuple[slice, ...]:
-    """Return the positions of inputs, a slice for each run of them."""
-    runs: list[slice] = []
-    for at, leaf in enumerate(sign.leaves):
-        if leaf.kind == "input":
-            if runs and runs[-1].stop == at:
-                runs[-1] = slice(runs[-1].start, at + 1)
-            else:
-                runs.append(slice(at, at + 1))
-    return tuple(runs)
 
 
 def _difference(level: RunningLevel, now: Values) -> str:
