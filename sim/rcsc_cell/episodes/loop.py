@@ -44,7 +44,6 @@ class Loop(loop.Loop):
     Attributes:
         state: What the cell's properties saw last.
         properties: Those of the cell.
-        refused: Why the script cannot be run; empty where it can.
 
     Raises:
         BadDescription, BadData, NotBuilt: The system is not in order.
@@ -55,19 +54,18 @@ class Loop(loop.Loop):
         self, episode: Episode, system: Path = SYSTEM, properties: Sequence[PropertyClass] = PROPERTIES
     ) -> None:
         its, self.database = ready(system)
-        self.refused = ""
+        refused = ""
         try:
             self.orders = operator_of(episode, self.database, its.signs["task"])
-        except (BadScript, ValueError) as error:
-            self.refused, episode = str(error), replace(episode, rows=(), interruptions=())
+        except (BadScript, ValueError):
+            refused, episode = "refused", replace(episode, rows=(), interruptions=())
             self.orders = operator_of(episode, self.database, its.signs["task"])
         self.in_cell = episode
         lying = [lying_at(self.database, part) for part in episode.parts]
         self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
         around = loop.Around(Staged((self.plant,), self.database.queries), self.orders)
         super().__init__(episode.in_any_system(), its, around=around)
-        if self.refused:
-            self._end = "refused"
+        self._end = refused
         seen = self.cycle
         self.cycle = self.state = CycleState(
             seen.levels,

@@ -3,7 +3,6 @@
 In: an episode and the path of a system. Out: what `rcsc_cell.episodes.loop` puts together.
 """
 
-from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from rcsc_cell.cell.ready import Lying
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import BadData
 from rcsc_cell.database.pose import about_z
-from rcsc_cell.episodes.episode import Episode, Interruption, PartSpec, script
+from rcsc_cell.episodes.episode import Episode, PartSpec, script
 from rcsc_cell.episodes.operator import Operator, commanded
 from rcsc_cell.workstation.prepared import database_of, needs_cell
 from rcsc_cell.workstation.script import ScriptRow, script_rows
@@ -59,25 +58,18 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
 
     Raises:
         BadScript: A row says nothing, or names something unknown.
-        ValueError: An interruption is none of TASK's commands.
+        ValueError: An interruption is none of TASK's commands, or several.
     """
+    changes = sorted(episode.interruptions, key=lambda change: change.tick)
+    rows = workstation(
+        [row for change in changes for row in rows_of((change.row,))], database.locations, task
+    ).rows
     station = workstation(rows_of(episode.rows), database.locations, task)
-    operator = Operator(station=station)
-    operator.changes = commands(episode.interruptions, operator)
-    return operator
-
-
-def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[int, ScriptRow]]:
-    """Return ticks and rows; a row that TASK cannot be told is refused now."""
-    timed_rows = []
-    for change in sorted(changes, key=lambda change: change.tick):
-        [row] = rows_of((change.row,))
-        for name in (row.source, row.dest, row.end_at):
-            if name and name not in operator.station.locations:
-                raise BadScript(f"no location is called `{name}`")
-        commanded(operator.station, row)
-        timed_rows.append((change.tick, row))
-    return timed_rows
+    for row in rows:
+        commanded(station, row)
+    return Operator(
+        station=station, changes=[(change.tick, row) for change, row in zip(changes, rows, strict=True)]
+    )
 
 
 def lying(database: Database, part: PartSpec) -> Lying:
