@@ -11,10 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from rcsc.base.host.files.names import shown
-from rcsc.lang.project import load
-from rcsc.run.campaign.rig import EpisodeKind, NamedFile, run_sources, usual_chunk
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, usual_chunk
 from rcsc.run.declared_plant import PlantSpec
-from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.description import BadDescription, description
 from rcsc.run.episodes.episode import Episode
 from rcsc.run.episodes.loop import check, run
 from rcsc.run.episodes.sampling import draw, fault_classes, fault_names
@@ -41,7 +40,7 @@ def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
     scripts += [described.script] if described.script else []
     spec = chosen(described, plant or None)
     own = [
-        *_programs(described, system),
+        *programs(described, system),
         described.database,
         *scripts,
         *([] if spec is None else _plant(spec)),
@@ -50,14 +49,6 @@ def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
     named = [(Path(os.path.relpath(file, system.parent.resolve())).as_posix(), file) for file in seen]
     installed = [] if spec is None else _module(spec)
     return [*named, *installed, *run_sources()]
-
-
-def _programs(described: Description, system: Path) -> Iterator[Path]:
-    """The sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
-    roots = (
-        place for level in described.levels for place in places(system, level.program) if place.is_file()
-    )
-    yield from sorted(map(Path, load([str(root) for root in roots]).files))
 
 
 def _plant(spec: PlantSpec) -> Iterator[Path]:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
 from rcsc.base.host.files.read import MOST_OF_OURS, content
-from rcsc.run.description import BadDescription, description
+from rcsc.lang.project import load
+from rcsc.run.description import BadDescription, Description, description, places
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.executors import NotBuilt
@@ -176,6 +177,14 @@ def digest(rig: Rig[Any]) -> str:
         held = content(path, MOST_OF_OURS) if path.is_file() else b""
         hashed.update(f"{name} {len(held)}\n".encode() + held)
     return hashed.hexdigest()
+
+
+def programs(described: Description, system: Path) -> list[Path]:
+    """The sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
+    roots = (
+        place for level in described.levels for place in places(system, level.program) if place.is_file()
+    )
+    return sorted(map(Path, load([str(root) for root in roots]).files))
 
 
 def run_sources() -> list[NamedFile]:

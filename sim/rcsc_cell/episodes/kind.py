@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import get_args
 
 from rcsc.base.host.files.names import shown
-from rcsc.run.campaign.rig import EpisodeKind, NamedFile, run_sources, sources
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, sources
 from rcsc.run.description import BadDescription, description
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.executors import NotBuilt
@@ -66,12 +66,11 @@ def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # bot
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:  # noqa: ARG001  # both plants are of the same
     """The data, the scripts, the tables that say what is to hold, and the programs around the executors."""
-    tables = [
-        (path.relative_to(system.parent).as_posix(), path) for path in sorted(system.parent.rglob("*.rcs"))
-    ]
+    described = description(system)
+    tables = [(f"{path.parent.name}/{path.name}", path) for path in programs(described, system)]
     scripts = [(f"scripts/{path.name}", path) for path in sorted(system.parent.glob("scripts/*.csv"))]
     cell = sources(Path(__file__).parents[1], "pictures")
-    return [("data", description(system).database), *scripts, *tables, *run_sources(), *cell]
+    return [("data", described.database), *scripts, *tables, *run_sources(), *cell]
 
 
 def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of physics alone
