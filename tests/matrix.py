@@ -21,14 +21,14 @@ from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.run.episodes.episode import Restart
 from rcsc.run.episodes.outcome import EpisodeFinding
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, PartSpec
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption
 from rcsc_cell.episodes.loop import Loop
+from tests.support import loops
 from tests.support.programs.stages import emitted
 from tests.support.programs.texts import one_row_a_line
 
 REPO = Path(__file__).parents[1]
-TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)
-ACQUIRE = Episode(executor="python", parts=TBOX, rows=("ACQUIRE,BOXT (2),BUFFER,,",))
+ACQUIRE = replace(loops.ACQUIRE, executor="python")
 FAR = Episode(executor="python", rows=("MOVE,,,BUFFER-SAFE,",))
 MOST_TICKS = 1500
 ADDRESS = """
