@@ -70,7 +70,7 @@ PROVER = ("rcsc/proof/solvers", "rcsc/proof/symbolic", "rcsc/proof/procedures", 
 READ_BY: Mapping[str, tuple[str, ...]] = {
     "check": ("rcsc/lang", *PROVER, "rcsc/driver"),
     "compose": ("rcsc/lang", *PROVER, "rcsc/compose"),
-    "campaign": ("rcsc/lang", "rcsc/code/emit", "rcsc/run", "sim"),
+    "campaign": ("rcsc/lang", "rcsc/code/emit", "rcsc/run", "rcsc/run/episodes", "sim"),
 }
 """Folders of rcsc on which an answer rests, besides the tables."""
 
