@@ -23,7 +23,7 @@ LineName: TypeAlias = tuple[str, str, str]
 """Level, table, line."""
 NamedFile: TypeAlias = tuple[str, Path]
 """A file, and a name for it that is the same in every checkout."""
-_ROOMS = ("run", "episodes", "lang", "testing/executors")
+_ROOMS = ("run", "lang", "code/testing/executors")
 """What runs episodes, draws them and watches them: properties are evaluated by the interpreter, edges taken from tests of the tables."""
 
 
@@ -189,8 +189,8 @@ def programs(described: Description, system: Path) -> list[Path]:
 
 def run_sources() -> list[NamedFile]:
     """Every module that has a part in an episode of any system, in its run and in what watches it."""
-    package = Path(__file__).parents[1]
-    return [module for room in _ROOMS for module in sources(package / room, "log")]
+    package = Path(__file__).parents[2]
+    return [module for room in _ROOMS for module in sources(package / room, "log", "link", "campaign")]
 
 
 def sources(folder: Path, *lookers: str) -> list[NamedFile]:
