@@ -61,14 +61,9 @@ class Digests:
         ]
         kept = [(invariant.name, repr(invariant.condition)) for invariant in self.program.invariants]
         hashed.update(repr((stated, kept)).encode())
-        body = [
-            action.statement
-            for line in (*table.lines, table.default)
-            if line is not None
-            for action in line.actions
-        ]
-        tests = {id(test): test.condition for line in table.lines for test in line.tests if test is not None}
-        conditions += [*tests.values(), *(invariant.condition for invariant in self.program.invariants)]
+        body = [action.statement for line in table.every_line for action in line.actions]
+        conditions += [test.condition for test in table.distinct_tests]
+        conditions += [invariant.condition for invariant in self.program.invariants]
         hashed.update(self._rest(body, conditions).encode())
         return hashed.hexdigest()
 

@@ -57,8 +57,8 @@ from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 
 
 def called_by_lines(program: Program) -> set[str]:
-    """Return the procedures that lines of tables call directly."""
-    lines = [line for table in program.tables for line in (*table.lines, table.default) if line is not None]
+    """Procedures that some line of some table calls itself."""
+    lines = [line for table in program.tables for line in table.every_line]
     actions = [action.statement for line in lines for action in line.actions]
     return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
 
@@ -70,8 +70,7 @@ def defined_alone(program: Program, table: Table) -> bool:
         {v.name: v.type for v in program.variables},
         {},
     )
-    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
-    for test in tests.values():
+    for test in table.distinct_tests:
         if may_be_undefined(test.condition):
             run.evaluate(test.condition)
     return not run.obligations
@@ -205,9 +204,8 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _tests(self, table: Table) -> Iterator[_Owing]:
-        """Yield every condition of the table that may be undefined: each is evaluated in every cycle, whatever the others say."""
-        every = {id(test): test for line in table.lines for test in line.tests}
-        owing = {key for key, test in every.items() if test is not None and may_be_undefined(test.condition)}
+        """Every condition of the table is evaluated in every cycle, whatever the others say."""
+        owing = {id(test): test for test in table.distinct_tests if may_be_undefined(test.condition)}
         stating: dict[int, list[tuple[Line, int]]] = {}
         for line in table.lines if owing else ():
             for at, test in enumerate(line.tests):
@@ -215,11 +213,9 @@ class Obligations:
                     stating.setdefault(id(test), []).append((line, at))
         where = f"in a condition of table `{table.name}`"
         for key, places in stating.items():
-            test = every[key]
-            assert test is not None
             line, at = places[0]
             span = line.cell_span(at)
-            yield _Owing(partial(self._test, test.condition, span), where, span, tuple(places))
+            yield _Owing(partial(self._test, owing[key].condition, span), where, span, tuple(places))
 
     def _test(self, condition: Expr, span: Span, assumed: list[Node]) -> tuple[Run, Known]:
         base = [*assumed, *self._invariants()]

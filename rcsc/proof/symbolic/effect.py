@@ -158,8 +158,7 @@ class Meaning:
 
     def lines(self, table: Table) -> list[Node]:
         """Return where each line matches, looking at no other; each test is asked once."""
-        tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
-        known = {at: self.condition(test.condition) for at, test in tests.items()}
+        known = {id(test): self.condition(test.condition) for test in table.distinct_tests}
         return [
             values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
         ]

@@ -124,9 +124,8 @@ def _renumbered(node: Shown, number: Mapping[int, int]) -> Shown:
 
 
 def _tests(table: Table, extents: Mapping[str, tuple[int, int]]) -> Iterator[Test]:
-    """Yield every distinct test that restricts its variable."""
-    distinct = {id(test): test for line in table.lines for test in line.tests if test is not None}
-    return (test for test in distinct.values() if test.box != (extents[test.variables[0]],))
+    """Every distinct condition that says anything."""
+    return (test for test in table.distinct_tests if test.box != (extents[test.variables[0]],))
 
 
 def _box_lines(

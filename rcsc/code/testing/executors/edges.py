@@ -7,20 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import inf, nan
 
 from rcsc.lang.interpret import holds
-from rcsc.lang.leaves import parts, read_by
+from rcsc.lang.leaves import everything, expressions, parts, read_by
 from rcsc.lang.model import (
     Among,
-    Assign,
     Bool,
-    Call,
     Case,
     Enum,
     Expr,
-    For,
-    If,
     Int,
     Literal,
-    Local,
     Program,
     Real,
     Scalar,
@@ -28,7 +23,6 @@ from rcsc.lang.model import (
     Statement,
     Table,
     Test,
-    ToElement,
     Value,
     Variable,
     key_bounds,
@@ -44,53 +38,28 @@ def reads(expr: Expr) -> set[str]:
     return set(read_by(expr))
 
 
-def expressions(body: Iterable[Statement]) -> Iterator[Expr]:
+def _evaluated(body: Iterable[Statement]) -> Iterator[Expr]:
     """Every expression of the statements, inner statements included."""
-    for statement in body:
-        match statement:
-            case Assign(place=place, value=value):
-                yield value
-                if isinstance(place, ToElement):
-                    yield place.index
-            case Local(value=value):
-                yield from () if value is None else (value,)
-            case If(condition=condition, then=then, orelse=orelse):
-                yield condition
-                yield from expressions((*then, *orelse))
-            case Case(subject=subject, arms=arms, orelse=orelse):
-                for arm in arms:
-                    yield Among(subject, arm.values)
-                    yield from expressions(arm.body)
-                yield from expressions(orelse)
-            case For(body=inner):
-                yield from expressions(inner)
-            case Call(args=args):
-                yield from args
-
-
-def tests_of(table: Table) -> tuple[Test, ...]:
-    """Every distinct test of the table, in order of its first line."""
-    tests: dict[tuple[str, Expr], Test] = {}
-    for line in table.lines:
-        for test in line.tests:
-            if test is not None:
-                tests.setdefault((test.text, test.condition), test)
-    return tuple(tests.values())
+    for statement in everything(body):
+        if isinstance(statement, Case):
+            yield from (Among(statement.subject, arm.values) for arm in statement.arms)
+        else:
+            yield from expressions(statement)
 
 
 def relational_tests(table: Table) -> tuple[Test, ...]:
     """The tests that are no box, in order of their first line."""
-    return tuple(test for test in tests_of(table) if test.box is None)
+    return tuple(test for test in table.distinct_tests if test.box is None)
 
 
 def all_expressions(program: Program) -> Iterator[Expr]:
     """Every expression that the executors evaluate."""
     for table in program.tables:
-        yield from (test.condition for test in tests_of(table))
+        yield from (test.condition for test in table.distinct_tests)
         for line in table.lines:
-            yield from expressions(action.statement for action in line.actions)
+            yield from _evaluated(action.statement for action in line.actions)
     for procedure in program.procedures:
-        yield from expressions(procedure.body)
+        yield from _evaluated(procedure.body)
     yield from (assumption.condition for assumption in program.assumptions)
     yield from (invariant.condition for invariant in program.invariants)
     yield from (v.deferred_until for v in program.variables if v.deferred_until is not None)
@@ -125,7 +94,7 @@ def leaf_edges(program: Program) -> dict[str, tuple[int, ...]]:
                     key = key_of(kind, value)
                     near[name].update((key - 1, key, key + 1))
     for table in program.tables:
-        for test in tests_of(table):
+        for test in table.distinct_tests:
             if test.box is not None:
                 near[test.variables[0]].update(k + d for ends in test.box for k in ends for d in (-1, 0, 1))
     return {variable.name: _inside(variable, near[variable.name]) for variable in program.variables}

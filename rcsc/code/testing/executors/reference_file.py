@@ -7,7 +7,7 @@ emitted header. Functions: `ref_t<i>_line`, `ref_t<i>_step` (table i), `ref_l<i>
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rcsc.code.testing.executors.edges import relational_tests, tests_of
+from rcsc.code.testing.executors.edges import relational_tests
 from rcsc.code.testing.executors.reference import Writer, constant, outside_tests, refusal, settling
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.interpret import Fault
@@ -98,18 +98,16 @@ def _safe_values(writer: Writer) -> Iterator[str]:
 def line_function(writer: Writer, number: int, table: Table) -> Iterator[str]:
     """The line that matches: index, `len(lines)` for DEFAULT, -1 for none, -2 for several."""
     struct = writer.symbols.struct
-    tests = {id(test): i for i, test in enumerate(tests_of(table))}
-    same = {(t.text, t.condition): i for i, t in enumerate(tests_of(table))}
+    tests = {id(test): i for i, test in enumerate(table.distinct_tests)}
     for at, test in enumerate(relational_tests(table)):
         yield f"static int32_t ref_t{number}_test{at}(const {struct} *s) {{"
         yield f"return {writer.expr(test.condition)}; }}"
     yield f"static int32_t ref_t{number}_line(const {struct} *s) {{"
     yield "(void)s; int32_t found = -1; int32_t many = 0;"
-    for i, test in enumerate(tests_of(table)):
+    for i, test in enumerate(table.distinct_tests):
         yield f"const int32_t c{i} = {writer.expr(test.condition)};"
     for index, line in enumerate(table.lines):
-        stated = [t for t in line.tests if t is not None]
-        cells = sorted({tests.get(id(t), same[(t.text, t.condition)]) for t in stated})
+        cells = sorted({tests[id(test)] for test in line.tests if test is not None})
         holds = " && ".join(f"c{i}" for i in cells) or "1"
         yield f"if ({holds}) {{ many += 1; found = {index}; }}"
     none = -1 if table.default is None else len(table.lines)

@@ -97,19 +97,19 @@ def kind_of(kinds: Mapping[str, Scalar], name: str) -> Scalar:
 def words_of(program: Program, table: Table) -> Words | None:
     """Return the words that the table's tests split; None where some test is no box of leaves or of parts."""
     kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
-    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
+    tests = table.distinct_tests
     looked_at: dict[str, list[Test]] = {}
-    for test in tests.values():
+    for test in tests:
         looked_at.setdefault(str(test.variables[0]), []).append(test)
     words = {leaf: _parts(leaf, kinds[leaf], of_leaf) for leaf, of_leaf in looked_at.items()}
     split = {leaf: parts for leaf, parts in words.items() if len(parts) > 1}
-    for test in tests.values():
+    for test in tests:
         parts = split.get(str(test.variables[0]))
         if parts is not None and boxes_of(test, parts) is None:
             if any(other.box is None for other in looked_at[str(test.variables[0])]):
                 return None
             del split[str(test.variables[0])]
-    whole = (test for test in tests.values() if str(test.variables[0]) not in split)
+    whole = (test for test in tests if str(test.variables[0]) not in split)
     return split if all(test.box is not None for test in whole) else None
 
 

@@ -87,14 +87,8 @@ def _default(table: Table) -> str:
 
 
 def _touched(versions: Versions, side: int, table: Table) -> set[str]:
-    body = [
-        action.statement
-        for line in (*table.lines, table.default)
-        if line is not None
-        for action in line.actions
-    ]
-    tests = [test.condition for line in table.lines for test in line.tests if test is not None]
-    return versions.digests[side].touched(body, tests)
+    body = [action.statement for line in table.every_line for action in line.actions]
+    return versions.digests[side].touched(body, [test.condition for test in table.distinct_tests])
 
 
 class _Comparison:
