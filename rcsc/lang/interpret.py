@@ -361,7 +361,7 @@ def chosen_table(program: Program, choice: TableChoice, now: Snapshot) -> Table:
     name = (
         choice.table if isinstance(choice, OneTable) else dict(choice.tables)[evaluate(choice.selector, now)]
     )
-    return next(table for table in program.tables if table.name == name)
+    return program.table(name)
 
 
 def run_stage(program: Program, table: Table, now: dict[str, Value]) -> Fault:
@@ -446,9 +446,8 @@ def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[s
     """Return those of the table's assumptions that are checked (monitored, or able to stop the cycle) and do not hold."""
     return tuple(
         assumption.name
-        for assumption in program.assumptions
-        if assumption.name in table.assumptions
-        and (assumption.standing.checked or assumption.name in table.stops)
+        for assumption in program.assumed(table)
+        if (assumption.standing.checked or assumption.name in table.stops)
         and not holds(assumption.condition, now)
     )
 

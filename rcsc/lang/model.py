@@ -993,6 +993,19 @@ class Program:
             variable.line_of: variable.name for variable in self.variables if variable.line_of is not None
         }
 
+    @property
+    def kinds(self) -> dict[str, Scalar]:
+        """The type of each leaf, by name."""
+        return {str(variable.name): variable.type for variable in self.variables}
+
+    def table(self, name: str) -> Table:
+        """The table called `name`; StopIteration if there is none."""
+        return next(table for table in self.tables if table.name == name)
+
+    def assumed(self, table: Table) -> tuple[Assumption, ...]:
+        """The assumptions that the table's proof may use, in declared order."""
+        return tuple(assumption for assumption in self.assumptions if assumption.name in table.assumptions)
+
     def variable(self, name: str) -> Variable:
         """Return the leaf called `name`; raise KeyError if there is none."""
         for variable in self.variables:

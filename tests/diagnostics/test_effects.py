@@ -15,10 +15,10 @@ from rcsc.lang.meaning import relying
 from rcsc.lang.model import Backing, Program, Value
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
+from rcsc.proof.relation.alike import alike
+from rcsc.proof.relation.effect import CALLS, RUN
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.symbolic.alike import alike
-from rcsc.proof.symbolic.effect import CALLS, RUN
 from rcsc.proof.table.diagnose import diagnostics
 from rcsc.proof.table.program import prove_program
 from rcsc.proof.table.verdict import Overlap, TableVerdict

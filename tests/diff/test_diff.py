@@ -35,10 +35,9 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.proof.relation.steps import UnansweredError
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.solvers.smt import Answer, Solver, UndecidedError
 from rcsc.views.diff.changes.difference import (
     Basis,
     Change,
@@ -851,9 +850,9 @@ def test_lines_that_can_newly_follow_are_those_that_do(edits: tuple[tuple[str, s
 
 def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.MonkeyPatch) -> None:
     def unanswered(*_: object) -> None:
-        raise UnansweredError
+        raise UndecidedError
 
-    monkeypatch.setattr("rcsc.views.diff.changes.follows.following", unanswered)
+    monkeypatch.setattr("rcsc.views.diff.changes.cycles.following", unanswered)
     found = compare(
         "case",
         program_of(LEVEL),

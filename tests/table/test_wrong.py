@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.proof.relation.alike import meeting
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.smt import Answer
-from rcsc.proof.symbolic.alike import meeting
 from tests import wrong
 from tests.support.programs.stages import reported
 from tests.support.steps import counted
@@ -106,7 +106,7 @@ def test_an_input_for_which_lines_differ_is_known_before_the_least_is_sought(
     with smt.together(1_000_000_000) as budget:
         [found] = (each for each in reported(text) if each.code == "RCS422")
     assert budget.left > 993_000_000
-    monkeypatch.setattr("rcsc.proof.symbolic.alike.WRONG_STEPS", 1)  # any input does
+    monkeypatch.setattr("rcsc.proof.relation.alike.WRONG_STEPS", 1)  # any input does
     [soon] = (each for each in reported(text) if each.code == "RCS422")
     assert found.witnesses
     assert soon.witnesses

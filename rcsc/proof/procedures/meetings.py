@@ -1,7 +1,7 @@
 """Lines that are said to match together: that those said to do the same do, and that what is said is said of some input.
 
 In: a program, whose tables may rely on its invariants, and one of its tables. Out: what is wrong, and whether the proof rests on
-the table's assumptions. The effects of two lines are compared as values (`symbolic.alike`), wherever both come through; where they
+the table's assumptions. The effects of two lines are compared as values (`relation.alike`), wherever both come through; where they
 differ such an input is shown, the least that a few steps find, with what each line leaves there.
 """
 
@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Effects, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.model import AssumptionName, Line, Meeting, Program, Table, Value, spell
+from rcsc.proof.relation.alike import Disagreement, alike, disagreement, meeting
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer
-from rcsc.proof.symbolic.alike import Disagreement, alike, disagreement, meeting
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def _results(program: Program, meeting: Meeting, shown: Disagreement) -> Iterato
 
 
 def _column(program: Program, table: Table, lines: Collection[Line], shown: Disagreement) -> WitnessColumn:
-    kinds = {str(variable.name): variable.type for variable in program.variables}
+    kinds = program.kinds
     names = tuple(name for name in kinds if name in shown.witness)
     matched = tuple(
         MatchedLine(str(line.name), tuple(_cells(table, line, name) for name in names), line.span)

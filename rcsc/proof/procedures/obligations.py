@@ -64,12 +64,8 @@ def called_by_lines(program: Program) -> set[str]:
 
 
 def defined_alone(program: Program, table: Table) -> bool:
-    """Return whether the declared ranges alone show every condition of the table to be defined, without a solver."""
-    run = Run(
-        {str(procedure.name): procedure for procedure in program.procedures},
-        {v.name: v.type for v in program.variables},
-        {},
-    )
+    """Whether the declared ranges alone show every condition of the table to be defined, without a solver."""
+    run = Run.of(program, {})
     for test in table.distinct_tests:
         if may_be_undefined(test.condition):
             run.evaluate(test.condition)
@@ -225,9 +221,7 @@ class Obligations:
 
     def _table(self, table: Table) -> None:
         """Discharge a table's conditions and lines; find the stopping assumptions."""
-        assumptions = [
-            assumption for assumption in self.program.assumptions if assumption.name in table.assumptions
-        ]
+        assumptions = self.program.assumed(table)
         needing = []
         for owing in (*self._tests(table), *self._lines(table)):
             try:

@@ -1,7 +1,7 @@
 """Which line of a table can match in the cycle after which.
 
 In: a table of a program. Out: pairs of lines, each answered by Z3 under the table's assumptions and the program's
-invariants; a question without an answer raises `UnansweredError`.
+invariants; a question without an answer raises `UndecidedError`.
 
 The whole cycle is followed: the first line's actions, postprocess, any new inputs, deferred values, preprocess. At first
 nothing is under way: deferred values are the present ones (see `steps`). Arithmetic on doubles is taken to give any value
@@ -10,17 +10,18 @@ within its bounds: there it may say "can" too often, never too seldom. Of the le
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import (
-    Action,
     Call,
     Int,
     Kind,
     Level,
     OneTable,
     Op,
+    ProcedureName,
     Program,
     Real,
     Single,
@@ -29,10 +30,10 @@ from rcsc.lang.model import (
     Value,
     pending,
 )
-from rcsc.proof.relation.steps import UnansweredError, answered, assumed
+from rcsc.proof.relation.questions import needed, possible, stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.solvers.smt import Solver, Term
+from rcsc.proof.solvers.smt import Term, UndecidedError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.encode import within
 from rcsc.proof.symbolic.evaluation import TooLongError
@@ -63,16 +64,16 @@ def following(program: Program, table: Table, options: Options) -> list[Follow]:
     """Every pair of lines of which the second can match in the cycle after the first.
 
     Raises:
-        UnansweredError: Z3 gave no answer, or a cycle is too long to follow.
+        UndecidedError: Z3 gave no answer, or a cycle is too long to follow.
     """
     whole = relying(program)
-    own = next(candidate for candidate in whole.tables if candidate.name == table.name)
+    own = whole.table(table.name)
     try:
         return list(_Cycles(whole, own, _level_of(whole, own), options).pairs())
     except (TooLongError, RecursionError) as error:
-        raise UnansweredError from error
+        raise UndecidedError from error
     except smt.troubles() as error:
-        raise UnansweredError from error
+        raise UndecidedError from error
 
 
 def _level_of(program: Program, table: Table) -> tuple[Level, Value | None] | None:
@@ -109,16 +110,6 @@ def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
                 yield within(node.term, ends)
 
 
-def _needed(tests: Mapping[int, Node], solver: Solver) -> tuple[int, ...]:
-    """The columns of a line whose tests neither its others nor what the solver knows imply."""
-    terms = {at: values.term_of(node) for at, node in tests.items()}
-    for at in list(terms):
-        others = [term for column, term in terms.items() if column != at]
-        if not answered(solver, *others, smt.negation(terms[at])):
-            del terms[at]
-    return tuple(terms)
-
-
 class _Cycles:
     """Two cycles of the level one after the other, from any state."""
 
@@ -126,8 +117,6 @@ class _Cycles:
         self, program: Program, table: Table, level: tuple[Level, Value | None] | None, options: Options
     ) -> None:
         self.program, self.table, self.level = program, table, level
-        self.kinds = {str(v.name): v.type for v in program.variables}
-        self.procedures = {str(p.name): p for p in program.procedures}
         self.start: dict[str, Node] = {}
         self.options = options
         self.cycle = 0
@@ -135,39 +124,30 @@ class _Cycles:
 
     def pairs(self) -> Iterator[Follow]:
         """Every pair that is possible."""
-        first = self._run()
+        first = Run.of(self.program, self.start)
         self._before_table(first)
         for variable in self.program.variables:
             if variable.deferred_until is not None:
                 first.state.leaves[pending(variable.name)] = first.leaf(variable.name)
         facts = self._facts(first)
         lines = self._lines(self._tests(first))
-        for at, actions in enumerate(self._actions()):
-            run = self._run()
+        for at, line in enumerate(self.table.every_line):
+            run = Run.of(self.program, self.start)
             run.state = first.state.copy()
-            run.execute(action.statement for action in actions)
+            run.execute(action.statement for action in line.actions)
             self._others(run, after=True)
             self._procedures(run, () if self.level is None else self.level[0].postprocess)
             self._before_table(run)
             known = [*facts, lines[at], *self._facts(run)]
             tests = self._tests(run)
             nexts = self._lines(tests)
-            solver = Solver(self.options.limits)
-            solver.add(
-                *values.domain(values.variables([*known, *nexts]).values()),
-                *loosened(known + nexts, self.loose),
-            )
-            solver.add(*map(values.term_of, known))
+            bounds = list(loosened(known + nexts, self.loose))  # before there are terms
+            solver = stated(known, self.options, nexts)
+            solver.add(*bounds)
             for to, node in enumerate(nexts):
-                if answered(solver, values.term_of(node)):
-                    yield Follow(at, to, _needed(tests[to], solver) if to < len(tests) else ())
-
-    def _run(self) -> Run:
-        return Run(self.procedures, self.kinds, self.start)
-
-    def _actions(self) -> list[tuple[Action, ...]]:
-        default = [] if self.table.default is None else [self.table.default.actions]
-        return [*(line.actions for line in self.table.lines), *default]
+                if possible(solver, node):
+                    can_be = partial(possible, solver)
+                    yield Follow(at, to, needed(tests[to], can_be) if to < len(tests) else ())
 
     def _before_table(self, run: Run) -> None:
         """Any inputs, the deferred values that are due, and the preprocess."""
@@ -190,11 +170,11 @@ class _Cycles:
             run.run_choice(choice, tables)
 
     def _procedures(self, run: Run, names: Sequence[str]) -> None:
-        run.execute(Call(self.procedures[name].name) for name in names)
+        run.execute(Call(ProcedureName(name)) for name in names)
 
     def _facts(self, run: Run) -> list[Node]:
         """Return what is known before the match."""
-        facts = [run.evaluate(assumption) for assumption in assumed(self.program, self.table)]
+        facts = [run.evaluate(assumption.condition) for assumption in self.program.assumed(self.table)]
         own = (
             [choice for choice in self.level[0].choices if self.table.name in choice.names]
             if self.level
@@ -207,10 +187,7 @@ class _Cycles:
 
     def _tests(self, run: Run) -> list[Mapping[int, Node]]:
         """The tests of each line, by column, as they are then; one that several lines state is evaluated once."""
-        known: dict[int, Node] = {}
-        for test in (test for line in self.table.lines for test in line.tests if test is not None):
-            if id(test) not in known:
-                known[id(test)] = run.evaluate(test.condition)
+        known = {id(test): run.evaluate(test.condition) for test in self.table.distinct_tests}
         return [
             {at: known[id(test)] for at, test in enumerate(line.tests) if test is not None}
             for line in self.table.lines

@@ -14,16 +14,15 @@ from typing import TypeAlias
 from rcsc.lang.hidden import hidden, matched
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
-from rcsc.proof.relation.steps import assumed
+from rcsc.proof.relation.effect import Effect, Meaning, Shared, differences, several
+from rcsc.proof.relation.questions import stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.effect import Effect, Meaning, Shared, differences, several
 from rcsc.proof.symbolic.encode import Frame, least_witness
 from rcsc.proof.symbolic.evaluation import TooLongError
-from rcsc.proof.symbolic.execution import Run
-from rcsc.proof.symbolic.values import Node
+from rcsc.proof.symbolic.values import TRUE, Node
 
 NO_LINE, SEVERAL_LINES, UNDEFINED = "no line", "several lines", "an undefined condition"
 
@@ -68,12 +67,37 @@ Comparison: TypeAlias = Same | Differs | NotDecided
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Outcome:
-    """What one table does for some inputs: the condition, and what its actions do; None where nothing runs."""
+class Outcome:
+    """What can become of an input.
+
+    Attributes:
+        name: Of the line; of a fault what it is.
+        when: At which inputs.
+        holds: Where the line matches, without what makes it the only one.
+        actions: None for a fault.
+    """
 
     name: str
     when: Node
-    effect: Effect | None
+    holds: Node = TRUE
+    actions: tuple[Action, ...] | None = None
+
+
+def outcomes(meaning: Meaning, table: Table) -> Iterator[Outcome]:
+    """Yield all outcomes of a table: for each input exactly one comes about."""
+    lines = meaning.lines(table)
+    undefined, many = values.any_of(meaning.bad), several(lines)
+    fine = values.negation(undefined)
+    alone = values.both(fine, values.negation(many))
+    for line, holds in zip(table.lines, lines, strict=True):
+        yield Outcome(line.name, values.both(alone, holds), holds, line.actions)
+    nothing, default = values.both(fine, values.negation(values.any_of(lines))), table.default
+    if default is None:
+        yield Outcome(NO_LINE, nothing)
+    else:
+        yield Outcome(default.name, nothing, TRUE, default.actions)
+    yield Outcome(SEVERAL_LINES, values.both(fine, many))
+    yield Outcome(UNDEFINED, undefined)
 
 
 def compare(first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> Comparison:
@@ -89,21 +113,16 @@ def compare(first: tuple[Program, Table], second: tuple[Program, Table], options
 class _Question:
     def __init__(self, first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> None:
         self.options = options
-        self.shared = Shared()
-        self.start = self.shared.start
         other, one = matched(second[0], first[0])
         program = relying(one)
         self.variables = program.variables
-        self.kinds = {str(v.name): v.type for v in (*other.variables, *program.variables)}
+        self.shared = Shared({**other.kinds, **program.kinds})
         own = hidden(one) ^ hidden(other)
-        self.compared = [name for name in self.kinds if name not in own]
-        for name, kind in self.kinds.items():
-            self.start[name] = self.shared.canonical(values.variable(name, kind))
-        self.outcomes = list(self._outcomes(one, _named(one, first[1])))
-        self.others = list(self._outcomes(other, _named(other, second[1])))
-        table = _named(program, first[1])
-        run = Run({}, self.kinds, self.start)
-        self.known = [run.evaluate(condition) for condition in assumed(program, table)]
+        self.compared = [name for name in self.shared.kinds if name not in own]
+        self.effects: dict[Outcome, Effect] = {}
+        self.outcomes = self._outcomes(one, first[1])
+        self.others = self._outcomes(other, second[1])
+        self.known = Meaning(program, self.shared).assumed(program.table(first[1].name))
         self.questions = 0
 
     def answer(self) -> Comparison:
@@ -119,79 +138,51 @@ class _Question:
                     break
         return Same(self.questions)
 
-    def _outcomes(self, program: Program, table: Table) -> Iterator[_Outcome]:
-        """Yield the table's outcomes; their conditions are disjoint and cover every input."""
-        meaning = Meaning(program, self.kinds, self.shared)
-        lines = meaning.lines(table)
-        undefined, twice = values.any_of(meaning.bad), several(lines)
-        defined, none = values.negation(undefined), values.negation(values.any_of(lines))
-        for line, when in zip(table.lines, lines, strict=True):
-            alone = values.all_of((when, values.negation(twice), defined))
-            yield _Outcome(line.name, alone, _done(meaning, line.actions))
-        none = values.both(none, defined)
-        if table.default is None:
-            yield _Outcome(NO_LINE, none, None)
-        else:
-            yield _Outcome(table.default.name, none, _done(meaning, table.default.actions))
-        yield _Outcome(SEVERAL_LINES, values.both(twice, defined), None)
-        yield _Outcome(UNDEFINED, undefined, None)
+    def _outcomes(self, program: Program, table: Table) -> list[Outcome]:
+        meaning = Meaning(program, self.shared)
+        found = list(outcomes(meaning, program.table(table.name)))
+        for outcome in found:
+            if outcome.actions is not None:
+                self.effects[outcome] = meaning.effect(action.statement for action in outcome.actions)
+        return found
 
-    def _unlike(self, first: _Outcome, second: _Outcome) -> Node:
-        if first.effect is None or second.effect is None:
-            return values.truth(first.name != second.name)
-        return values.any_of(node for _, node in self._changes(first.effect, second.effect))
+    def _changes(self, first: Outcome, second: Outcome) -> list[tuple[str, Node]]:
+        """What can differ afterwards, and where it does; nothing where one of them is a fault."""
+        if first.actions is None or second.actions is None:
+            return []
+        return list(differences(self.effects[first], self.effects[second], self.compared, self.shared))
 
-    def _changes(self, first: Effect, second: Effect) -> Iterator[tuple[str, Node]]:
-        """Yield what can differ afterwards, and where it does."""
-        return differences(first, second, self.compared, self.shared)
-
-    def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
-        """Ask whether `wrong` is possible; return the answer, its solver and variables."""
+    def _check(self, wrong: Node) -> tuple[Answer, Solver | None]:
+        """Ask whether `wrong` is possible; return the answer and its solver."""
         if wrong is values.FALSE:
-            return Answer.UNSATISFIABLE, None, {}
+            return Answer.UNSATISFIABLE, None
         self.questions += 1
-        variables = values.variables([*self.known, wrong])
-        solver = Solver(self.options.limits)
-        solver.add(*values.domain(variables.values()), *map(values.term_of, [*self.known, wrong]))
-        return solver.check(), solver, variables
+        solver = stated([*self.known, wrong], self.options)
+        return solver.check(), solver
 
-    def _asked(self, first: _Outcome, second: _Outcome) -> Comparison | None:
+    def _asked(self, first: Outcome, second: Outcome) -> Comparison | None:
         """Compare two outcomes; None where they never meet, or agree where they do."""
-        answer, solver, variables = self._check(
-            values.all_of((first.when, second.when, self._unlike(first, second)))
-        )
+        changes = self._changes(first, second)
+        if first.actions is None or second.actions is None:
+            unlike = values.truth(first.name != second.name)
+        else:
+            unlike = values.any_of(node for _, node in changes)
+        wrong = values.all_of((first.when, second.when, unlike))
+        answer, solver = self._check(wrong)
         if solver is None or answer is Answer.UNSATISFIABLE:
             return None
-        if answer is Answer.UNKNOWN:
-            return NotDecided(first.name, second.name)
-        return self._witness(solver, variables, first, second)
-
-    def _witness(
-        self, solver: Solver, variables: dict[str, Node], first: _Outcome, second: _Outcome
-    ) -> Comparison:
+        variables = values.variables([*self.known, wrong])
         order = {v.name: at for at, v in enumerate(self.variables)}
         names = sorted(variables, key=lambda name: (order.get(VariableName(name), len(order)), name))
         shown = [_shown(name, variables[name].kind) for name in names]
         frame = Frame({name: values.term_of(node) for name, node in variables.items()})
-        least = least_witness(solver, shown, frame)
+        least = None if answer is Answer.UNKNOWN else least_witness(solver, shown, frame)
         if least is None:
             return NotDecided(first.name, second.name)
-        changed: tuple[str, ...] = ()
-        if first.effect is not None and second.effect is not None:
-            changed = tuple(
-                name
-                for name, node in self._changes(first.effect, second.effect)
-                if solver.check(values.term_of(node)) is Answer.SATISFIABLE
-            )
+        changed = tuple(
+            name for name, node in changes if solver.check(values.term_of(node)) is Answer.SATISFIABLE
+        )
         return Differs(tuple((v, least[v.name]) for v in shown), first.name, second.name, changed)
-
-
-def _named(program: Program, table: Table) -> Table:
-    return next(candidate for candidate in program.tables if candidate.name == table.name)
-
-
-def _done(meaning: Meaning, actions: tuple[Action, ...]) -> Effect:
-    return meaning.effect(action.statement for action in actions)
 
 
 def _shown(name: str, kind: Scalar) -> Variable:

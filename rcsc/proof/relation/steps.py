@@ -1,7 +1,7 @@
 """Which line leads from which state to which.
 
 In: a table, and the variable that holds its state. Out: steps, each answered by Z3 under the table's
-assumptions and the program's invariants; a question without an answer raises `UnansweredError`: nothing is drawn from it.
+assumptions and the program's invariants; a question without an answer raises `UndecidedError`: nothing is drawn from it.
 
 A step is one match: the state before it, and the state that the line's actions lead to. If the state is
 deferred, its pending value counts; before the match that is taken to be the present one: nothing is under way. Under the
@@ -9,23 +9,21 @@ protocol a line that gives an order matches again until its echo, and a line tha
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 from rcsc.lang.meaning import relying
-from rcsc.lang.model import Action, Expr, Program, Table, Value, Variable, key_bounds, pending, value_of_key
+from rcsc.lang.model import Action, Program, Table, Value, Variable, key_bounds, pending, value_of_key
+from rcsc.proof.relation.effect import Effect, Meaning, Shared, value_after
+from rcsc.proof.relation.questions import needed, possible
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.solvers.smt import Solver, UndecidedError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.evaluation import TooLongError
-from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import Node
 
 MOST_STATES = 64
 """Values of a state variable up to which a graph of them is drawn."""
-
-
-class UnansweredError(Exception):
-    """Z3 gave no answer within its limits, or a run is too long to follow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +43,25 @@ class Step:
     decided: bool = False
 
 
-@dataclass(slots=True)
+def reached(solver: Solver, before: Node, after: Node) -> Iterator[tuple[Value, Value]]:
+    """Yield each pair that two values can be together, by what the solver knows; that they are another pair is asserted.
+
+    Raises:
+        UndecidedError: Z3 gave no answer.
+    """
+    while solver.possible():
+        ends = [solver.value(values.term_of(node), node.kind) for node in (before, after)]
+        yield ends[0], ends[1]
+        solver.add(values.term_of(values.negation(pair_is((before, after), ends))))
+
+
+def pair_is(nodes: Sequence[Node], ends: Sequence[Value]) -> Node:
+    """The condition that nodes have these values."""
+    return values.all_of(
+        values.equal(node, values.constant(node.kind, end)) for node, end in zip(nodes, ends, strict=True)
+    )
+
+
 class Steps:
     """One table's steps.
 
@@ -53,127 +69,83 @@ class Steps:
         state: The variable whose values are the states; an enumeration, a boolean or a few integers.
     """
 
-    program: Program
-    table: Table
-    state: Variable
-    options: Options
-    _start: dict[str, Node] = field(default_factory=dict)
-    _solver: Solver = field(init=False)
-    _lines: list[Node] = field(init=False)
-    _asserted: set[str] = field(default_factory=set)
-
-    def __post_init__(self) -> None:
-        self.program = relying(self.program)
-        self.table = next(table for table in self.program.tables if table.name == self.table.name)
-        self._solver = Solver(self.options.limits)
-        before = values.variable(self.state.name, self.state.type)
-        self._start[self.state.name] = before
-        if self.state.deferred_until is not None:
-            self._start[pending(self.state.name)] = before
-        run = self._run()
-        self._know([run.evaluate(assumption) for assumption in assumed(self.program, self.table)])
-        lines = [
-            values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
-        ]
-        none = values.negation(values.any_of(lines))
-        self._lines = [*lines, none] if self.table.default is not None else lines
+    def __init__(self, program: Program, table: Table, state: Variable, options: Options) -> None:
+        program = relying(program)
+        self.table, self.state = program.table(table.name), state
+        self._next = str(state.name if state.deferred_until is None else pending(state.name))
+        self._shared = Shared(program.kinds)
+        self._before = self._shared.start[self._next] = self._shared.start[str(state.name)]
+        self._meaning = Meaning(program, self._shared)
+        self._solver = Solver(options.limits)
+        self._asserted: set[str] = set()
+        known = self._meaning.assumed(self.table)
+        self._declare(known)
+        self._solver.add(*map(values.term_of, known))
+        self._lines = self._meaning.every_line(self.table)
 
     def states(self) -> list[Value]:
         """The values that the state variable can have under the assumptions, in order."""
-        return [value for value in self._values() if self._possible(self._is(self._before(), value))]
+        return [value for value in self._values() if self._possible(self._is(value))]
 
     def steps(self, states: Sequence[Value]) -> list[Step]:
         """Every step from these states; by line, then in the states' order."""
         steps: list[Step] = []
-        for at, actions in enumerate(self._actions()):
-            after = self._after(actions)
-            self._declare([self._lines[at], *(node for pair in after for node in pair)])
-            self._solver.push()  # a line is stated once, for all states
-            self._solver.add(values.term_of(self._lines[at]))
+        for at, line in enumerate(self.table.every_line):
+            pairs = self._pairs(self._lines[at], line.actions)
             for source in states:
-                here = self._is(self._before(), source)
-                if self._possible(here):
-                    targets = [value for value in self._values() if self._leads(here, source, value, after)]
-                    steps += [Step(at, source, target, len(targets) > 1) for target in targets]
-            self._solver.pop()
+                targets = [value for value in self._values() if (source, value) in pairs]
+                steps += [Step(at, source, target, len(targets) > 1) for target in targets]
         return steps
 
-    def _leads(self, here: Node, source: Value, target: Value, after: Sequence[tuple[Node, Node]]) -> bool:
-        """Whether the line that is stated can lead from a state to another; where it leaves the state as it is nothing is asked."""
-        return any(
-            source == target
-            if when is values.TRUE and node is self._before()
-            else self._possible(here, when, self._is(node, target))
-            for when, node in after
-        )
+    def _pairs(self, line: Node, actions: Sequence[Action]) -> set[tuple[Value, Value]]:
+        """Every state before with one to which the actions lead: the pending one, and one written directly."""
+        effect = self._effect(actions)
+        after = [(values.TRUE, value_after(effect, self._next, self._shared))]
+        if self.state.name != self._next and self.state.name in effect.wrote:
+            after.append((effect.wrote[self.state.name], effect.leaves[self.state.name]))
+        pairs = set[tuple[Value, Value]]()
+        for when, node in after:
+            self._declare([line, when, node, self._before])
+            self._solver.push()
+            self._solver.add(values.term_of(line), values.term_of(when))
+            pairs.update(reached(self._solver, self._before, node))
+            self._solver.pop()
+        return pairs
 
     def sets(self, action: Action) -> Value | None:
         """The state that the action alone, whatever the input, leads to; None where it does anything else too."""
-        run = self._followed([action])
-        written = {name for name, when in run.state.wrote.items() if when is not values.FALSE}
-        if written != {self._next()} or run.state.wrote[self._next()] is not values.TRUE:
+        effect = self._effect([action])
+        written = {name for name, when in effect.wrote.items() if not when.known or when.low}
+        if written != {self._next} or not effect.wrote[self._next].known:
             return None
-        after = run.leaf(self._next())
+        after = effect.leaves[self._next]
         return value_of_key(self.state.type, int(after.low)) if after.known else None
 
     def writes(self, action: Action) -> bool:
         """Whether the action can write the state."""
-        return not {self._next(), self.state.name}.isdisjoint(self._followed([action]).state.wrote)
+        return not {self._next, self.state.name}.isdisjoint(self._effect([action]).wrote)
 
     def needed(self, line: int, source: Value | None) -> tuple[int, ...]:
         """Columns of a line whose tests the state and the others do not imply; in every state where it is None."""
-        run = self._run()
-        tests = {
-            at: run.evaluate(test.condition)
-            for at, test in enumerate(self.table.lines[line].tests)
-            if test is not None
-        }
-        here = [] if source is None else [self._is(self._before(), source)]
-        for at in list(tests):
-            others = [node for column, node in tests.items() if column != at]
-            if not self._possible(*here, *others, values.negation(tests[at])):
-                del tests[at]
-        return tuple(tests)
+        tests = enumerate(self.table.lines[line].tests)
+        stated = {at: self._meaning.condition(test.condition) for at, test in tests if test is not None}
+        here = [] if source is None else [self._is(source)]
+        return needed(stated, partial(self._possible, *here))
 
     # --- parts ---
-
-    def _run(self) -> Run:
-        kinds = {str(v.name): v.type for v in self.program.variables}
-        return Run({str(p.name): p for p in self.program.procedures}, kinds, self._start)
-
-    def _next(self) -> str:
-        return pending(self.state.name) if self.state.deferred_until is not None else self.state.name
-
-    def _before(self) -> Node:
-        return self._start[self.state.name]
 
     def _values(self) -> Iterator[Value]:
         low, high = key_bounds(self.state.type)
         return (value_of_key(self.state.type, key) for key in range(low, high + 1))
 
-    def _is(self, node: Node, value: Value) -> Node:
-        return values.equal(node, values.constant(self.state.type, value))
+    def _is(self, value: Value) -> Node:
+        return pair_is([self._before], [value])
 
-    def _actions(self) -> list[tuple[Action, ...]]:
-        default = [] if self.table.default is None else [self.table.default.actions]
-        return [*(line.actions for line in self.table.lines), *default]
-
-    def _followed(self, actions: Sequence[Action]) -> Run:
-        run = self._run()
-        _execute(run, actions)
-        return run
-
-    def _after(self, actions: Sequence[Action]) -> list[tuple[Node, Node]]:
-        """Return the states that the actions lead to, each with its condition: the pending one, and one written directly."""
-        run = self._followed(actions)
-        successors = [(values.TRUE, run.leaf(self._next()))]
-        if self.state.name != self._next() and self.state.name in run.state.wrote:
-            successors.append((run.state.wrote[self.state.name], run.leaf(self.state.name)))
-        return successors
-
-    def _know(self, nodes: Sequence[Node]) -> None:
-        self._declare(nodes)
-        self._solver.add(*map(values.term_of, nodes))
+    def _effect(self, actions: Sequence[Action]) -> Effect:
+        try:
+            return self._meaning.effect(action.statement for action in actions)
+        except (TooLongError, RecursionError) as error:
+            raise UndecidedError from error
 
     def _declare(self, nodes: Sequence[Node]) -> None:
         """Asserts the ranges of variables not met before."""
@@ -182,34 +154,5 @@ class Steps:
         self._solver.add(*values.domain(new))
 
     def _possible(self, *nodes: Node) -> bool:
-        if any(node is values.FALSE for node in nodes):
-            return False
         self._declare(nodes)
-        return answered(self._solver, *map(values.term_of, nodes))
-
-
-def assumed(program: Program, table: Table) -> list[Expr]:
-    """The conditions that the table may rely on."""
-    return [
-        assumption.condition for assumption in program.assumptions if assumption.name in table.assumptions
-    ]
-
-
-def answered(solver: Solver, *terms: Term) -> bool:
-    """Whether the terms can hold; UnansweredError where the solver cannot say."""
-    solver.push()
-    try:
-        solver.add(*terms)
-        answer = solver.check()
-    finally:
-        solver.pop()
-    if answer is Answer.UNKNOWN:
-        raise UnansweredError
-    return answer is Answer.SATISFIABLE
-
-
-def _execute(run: Run, actions: Sequence[Action]) -> None:
-    try:
-        run.execute(action.statement for action in actions)
-    except (TooLongError, RecursionError) as error:
-        raise UnansweredError from error
+        return possible(self._solver, *nodes)

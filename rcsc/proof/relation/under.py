@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import Expr, Program, Table
-from rcsc.proof.relation.steps import assumed
+from rcsc.proof.relation.effect import Meaning, Shared
+from rcsc.proof.relation.questions import answer, stated
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.solvers.smt import Answer, Solver, troubles
+from rcsc.proof.solvers.smt import Answer, troubles
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.evaluation import TooLongError
-from rcsc.proof.symbolic.execution import Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,26 +34,14 @@ class Under:
 def lines_under(program: Program, table: Table, condition: Expr, options: Options) -> Under:
     """The lines that can match where a condition holds."""
     program = relying(program)
-    meant = next(each for each in program.tables if each.name == table.name)
-    run = Run(
-        {str(each.name): each for each in program.procedures},
-        {str(each.name): each.type for each in program.variables},
-        {},
-    )
+    meant = program.table(table.name)
+    meaning = Meaning(program, Shared(program.kinds))
     names = [str(line.name) for line in meant.every_line]
     try:
-        known = [run.evaluate(each) for each in assumed(program, meant)]
-        lines = [
-            values.all_of(run.evaluate(test.condition) for test in line.tests if test) for line in meant.lines
-        ]
-        if meant.default is not None:
-            lines.append(values.negation(values.any_of(lines)))
-        wanted = run.evaluate(condition)
-        solver = Solver(options.limits)
-        solver.add(*values.domain(list(values.variables([*known, *lines, wanted]).values())))
-        solver.add(*map(values.term_of, known))
-        inside = [_answer(solver, wanted, line) for line in lines]
-        outside = [_answer(solver, values.negation(wanted), line) for line in lines]
+        lines, wanted = meaning.every_line(meant), meaning.condition(condition)
+        solver = stated(meaning.assumed(meant), options, [*lines, wanted])
+        inside = [answer(solver, wanted, line) for line in lines]
+        outside = [answer(solver, values.negation(wanted), line) for line in lines]
     except (TooLongError, RecursionError):
         return Under((), tuple(names), ())
     except troubles():
@@ -66,14 +54,3 @@ def lines_under(program: Program, table: Table, condition: Expr, options: Option
             name for name, now, else_ in told if (now, else_) == (Answer.SATISFIABLE, Answer.UNSATISFIABLE)
         ),
     )
-
-
-def _answer(solver: Solver, *nodes: values.Node) -> Answer:
-    if any(node is values.FALSE for node in nodes):
-        return Answer.UNSATISFIABLE
-    solver.push()
-    try:
-        solver.add(*map(values.term_of, nodes))
-        return solver.check()
-    finally:
-        solver.pop()

@@ -219,10 +219,14 @@ def gives_up(what: str) -> bool:
     return False
 
 
+class UndecidedError(Exception):
+    """Z3 gave no answer within its limits, where one is needed."""
+
+
 def troubles() -> tuple[type[BaseException], ...]:
-    """Return the errors of Z3 and of exhausted memory, also outside a check; after one nothing is proved."""
+    """No answer where one is needed, errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
     loaded = sys.modules.get("z3")
-    return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
+    return (UndecidedError, MemoryError, *(() if loaded is None else (loaded.Z3Exception,)))
 
 
 def _float_sort(kind: Real) -> Any:
@@ -532,6 +536,17 @@ class Solver:
         if answer != z3.unsat:
             _open.append(why)
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def possible(self, *assuming: Term) -> bool:
+        """Whether all asserted terms, and these, hold together for some values.
+
+        Raises:
+            UndecidedError: Z3 gave no answer.
+        """
+        answer = self.check(*assuming)
+        if answer is Answer.UNKNOWN:
+            raise UndecidedError
+        return answer is Answer.SATISFIABLE
 
     def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:
         """Return Z3's answer, and why there is none; ask again where other processes took the time that it was given."""

@@ -24,6 +24,6 @@ for counterexamples by running the interpreter where doubles make a solver slow.
 Trusted, without `rcsc certify`: everything but `bits` and `trial`, whose results others confirm. A run that is longer
 than `MOST_STEPS` is not followed, and the program is then not proved.
 
-Modules, in the order the data flows: `values`, `evaluation`, `execution`, `effect`, `alike` (two lines), then
-`encode`, `keyed`, `measured`, `bits`, `trial`, `remembered` (answers to questions asked before).
+Modules, in the order the data flows: `values`, `evaluation`, `execution`, then `encode`, `keyed`, `measured`, `bits`,
+`trial`, `remembered` (answers to questions asked before).
 """

@@ -6,7 +6,7 @@ In: statements and a state. Out: the state after them, and what they owe (`evalu
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import assert_never
+from typing import Self, assert_never
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
@@ -43,6 +43,11 @@ from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 @dataclass(slots=True)
 class Run(Evaluation):
     """One symbolic run."""
+
+    @classmethod
+    def of(cls, program: Program, start: dict[str, Node]) -> Self:
+        """A run of a program from these leaves; those that it meets besides may have any value."""
+        return cls({str(procedure.name): procedure for procedure in program.procedures}, program.kinds, start)
 
     def execute(self, body: Iterable[Statement]) -> None:
         """Runs statements; the state is changed."""

@@ -70,7 +70,7 @@ class TableBoxes(Boxes[str]):
     def of(cls, program: Program, table: Table, words: Words | None = None) -> "TableBoxes":
         """Build the table's boxes. All its tests must be boxes, and those of split words boxes of their parts."""
         split = words or {}
-        kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+        kinds: dict[str, Scalar] = program.kinds
         extents: dict[str, tuple[int, int]] = {}
         for leaf in table.variables:
             parts = {part.name: key_bounds(part.kind) for part in split.get(leaf, ())}

@@ -30,7 +30,7 @@ Shown: TypeAlias = list[Any]
 def box_certificate(program: Program, table: Table) -> Certificate:
     """Make the certificate of a table without relational conditions, proved without assumptions."""
     names = [str(name) for name in table.variables]
-    types = {str(variable.name): variable.type for variable in program.variables}
+    types = program.kinds
     extents = {name: key_bounds(types[name]) for name in names}
     tested = {str(test.variables[0]) for test in _tests(table, extents)}
     count = prod(high - low + 1 for name, (low, high) in extents.items() if name in tested)

@@ -18,8 +18,8 @@ from rcsc.proof.table.verdict import Gap, Overlap, TableFinding, Undecided, refu
 
 
 def shown(program: Program, table: Table) -> list[Variable]:
-    """Return the variables of a witness, in declared order: those that the table or its assumptions read."""
-    assumed = (a.condition for a in program.assumptions if a.name in table.assumptions)
+    """The variables of a witness, in declared order: what the table or its assumptions read."""
+    assumed = (assumption.condition for assumption in program.assumed(table))
     wanted = set(table.variables).union(*map(read_by, assumed))
     return [variable for variable in program.variables if variable.name in wanted]
 
@@ -30,8 +30,7 @@ class TableSolver:
     def __init__(self, program: Program, table: Table, options: Options) -> None:
         self.program, self.table = program, table
         # What nothing here reads has some value in its range, whatever the others have.
-        wanted = set(table.assumptions)
-        assumed = [a.condition for a in program.assumptions if a.name in wanted]
+        assumed = [assumption.condition for assumption in program.assumed(table)]
         tests = [test.condition for test in table.distinct_tests]
         self.frame, domain = declared(shown(program, table), [*tests, *assumed])
         self.solver = Solver(options.limits)

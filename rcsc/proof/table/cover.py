@@ -31,7 +31,7 @@ from rcsc.lang.model import (
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import furthest, halved
-from rcsc.proof.solvers.smt import Answer, Solver, Term
+from rcsc.proof.solvers.smt import Answer, Solver, Term, UndecidedError
 from rcsc.proof.symbolic import trial, values
 from rcsc.proof.symbolic.encode import Frame, at_most_key, least_witness
 from rcsc.proof.symbolic.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node
@@ -39,10 +39,6 @@ from rcsc.proof.table.verdict import Region
 
 _MOST_CLASSES = 64
 """Classes of one variable that are tried one by one when a box is grown."""
-
-
-class UndecidedError(Exception):
-    """The solver gave up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +103,7 @@ class Space:
             UndecidedError: The solver gave up.
         """
         self.queries += 1
-        answer = solver.check(*terms)
-        if answer is Answer.UNKNOWN:
-            raise UndecidedError
-        return answer is Answer.SATISFIABLE
+        return solver.possible(*terms)
 
     def witness(self, *nodes: Node) -> dict[str, Value]:
         """Return the least input at which the nodes hold; there is one.

@@ -79,9 +79,11 @@ def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFindin
 
 
 def _narrows(program: Program, table: Table) -> bool:
-    """Return whether an assumption reads a variable that the table's conditions read."""
-    assumed = [assumption for assumption in program.assumptions if assumption.name in table.assumptions]
-    return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
+    """Whether an assumption reads what the table's conditions read."""
+    return any(
+        not set(read_by(assumption.condition)).isdisjoint(table.variables)
+        for assumption in program.assumed(table)
+    )
 
 
 def _wrong(table: Table, findings: tuple[TableFinding, ...]) -> bool:

@@ -29,9 +29,9 @@ from rcsc.lang.model import (
     key_bounds,
     spell,
 )
+from rcsc.proof.relation.alike import alike
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
-from rcsc.proof.symbolic.alike import alike
 from rcsc.proof.table import cells as words
 from rcsc.proof.table.certificate import must_cover
 from rcsc.proof.table.findings.groups import grouped, names_of
@@ -377,7 +377,7 @@ def _more(program: Program, gap: Gap) -> int:
 
 def _inputs(program: Program, gap: Gap) -> list[int | None]:
     """Count the inputs of each region; None where there is none."""
-    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    kinds: dict[str, Scalar] = program.kinds
     return [
         None if region is None else words.inputs(kinds, region, witness)
         for witness, region in zip(gap.witnesses, gap.regions, strict=True)
@@ -393,7 +393,7 @@ def _by_member(program: Program, gap: Gap) -> tuple[str, ...]:
     counts = _inputs(program, gap)
     if len(counts) < MANY or gap.count is None or _more(program, gap):
         return ()
-    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    kinds: dict[str, Scalar] = program.kinds
     names = [name for name in gap.witnesses[0] if isinstance(kinds[name], Enum)]
     tables = {name: _shares(kinds, name, gap, counts) for name in names}
     if not tables:
@@ -435,7 +435,7 @@ def _share(count: int, total: int) -> str:
 def _column(
     program: Program, table: Table, witness: Witness, lines: tuple[int, ...], region: Region | None
 ) -> WitnessColumn:
-    kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
+    kinds: dict[str, Scalar] = program.kinds
     names = tuple(name for name in kinds if name in witness)
     matched = tuple(
         MatchedLine(

@@ -269,8 +269,8 @@ class Silent(Nothing):
 
 
 def _matches_one(program: Program, table: Table, witness: WitnessColumn) -> bool:
-    """Return whether exactly one line matches the witness of a gap."""
-    kinds = {str(each.name): each.type for each in program.variables}
+    """Whether exactly one line matches an input that none did."""
+    kinds = program.kinds
     values = zip(witness.variables, witness.values, strict=True)
     try:
         now = initial(program) | {name: unspelled(kinds[name], text) for name, text in values}

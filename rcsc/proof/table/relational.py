@@ -197,7 +197,7 @@ class _Decision:
             for _ in parts(test.condition)
         )
         yield from points[: max(_FEWEST_POINTS, trial.EVALUATIONS // max(1, nodes))]
-        kinds = {str(v.name): v.type for v in self.program.variables}
+        kinds = self.program.kinds
         aims = {id(test): trial.Aim.of(test) for test in self.table.distinct_tests}
         tests = [[aims[id(test)] for test in line.tests if test is not None] for line in self.table.lines]
         for one in tests * _AIMED:
@@ -206,13 +206,8 @@ class _Decision:
             yield trial.towards(random.choice(points), [*one, *other], kinds, random)
 
     def allowed(self, snapshot: Snapshot) -> frozenset[int] | None:
-        """Return the lines that match; None where an assumption fails, or a line's condition is undefined."""
-        names = self.table.assumptions
-        if not all(
-            fold(assumption.condition, snapshot)
-            for assumption in self.program.assumptions
-            if assumption.name in names
-        ):
+        """The lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
+        if not all(fold(each.condition, snapshot) for each in self.program.assumed(self.table)):
             return None
         try:
             return frozenset(self.matching(snapshot))

@@ -137,7 +137,7 @@ class Partings:
         decided, table = self._boxes, self.table
         if decided is None:
             return ()
-        kinds: dict[str, Scalar] = {v.name: v.type for v in self.program.variables}
+        kinds: dict[str, Scalar] = self.program.kinds
         default = table.default is not None and not table.default.unreachable
         every = (
             _narrowed(decided, kinds, table, line, other, name)
@@ -249,7 +249,7 @@ def changes_of(program: Program, table: Table, changed: Sequence[PartingCell]) -
         return ()
     often = Counter((cell.line, cell.column) for cell in changed)
     texts = {(cell.line, cell.column): cell.text for cell in changed}
-    kinds = {str(v.name): v.type for v in program.variables}
+    kinds = program.kinds
     for line, column in (place for place, many in often.items() if many > 1):
         test, name = after.lines[line].tests[column], table.columns[column].variable
         text = (
@@ -319,8 +319,8 @@ def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:
 
 
 def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> NewLine | None:
-    """Return a line whose cells state the region, for a table of boxes; None where no such line parts from all others."""
-    kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
+    """The line of a table of boxes whose cells say the region."""
+    kinds: dict[str, Scalar] = program.kinds
     told = [cells.cell_under(column, kinds, region) for column in _written(table)]
     said = [cell for cell in told if cell is not None]
     decided = boxes.TableBoxes.of(program, table, words)
@@ -407,8 +407,8 @@ class _Row:
     cells: dict[int, _Cell] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Build the clauses of lines and assumptions."""
-        self.kinds = {str(v.name): v.type for v in self.program.variables}
+        """States lines and assumptions."""
+        self.kinds = self.program.kinds
         self.lines = lines_of(self.universe, self.table)
         self.assumed = assumptions_of(self.universe, self.program, self.table)
 

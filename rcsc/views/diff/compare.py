@@ -11,14 +11,11 @@ from rcsc.proof.procedures.obligations import Obligations
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.symbolic.evaluation import TooLongError
-from rcsc.proof.table.cover import UndecidedError
 from rcsc.views.diff.changes import parts
 from rcsc.views.diff.changes.align import aligned
+from rcsc.views.diff.changes.cycles import follows, traces
 from rcsc.views.diff.changes.difference import ComparedPart, Difference, ProgramDifference, Traces
-from rcsc.views.diff.changes.follows import follows
-from rcsc.views.diff.changes.requirements import named_otherwise
 from rcsc.views.diff.changes.tables import table_part
-from rcsc.views.diff.changes.traces import traces
 from rcsc.views.diff.changes.versions import Versions
 from rcsc.views.diff.revision import NotComparedError
 from rcsc.views.diff.sides import Side, pairs
@@ -30,12 +27,7 @@ def compare(
     """What changed between two versions of a program; with `follow`, which lines can follow which, too."""
     alignment = aligned(before, after)
     versions = Versions(alignment, options)
-    given_up: tuple[type[BaseException], ...] = (
-        UndecidedError,
-        TooLongError,
-        RecursionError,
-        *smt.troubles(),
-    )
+    given_up: tuple[type[BaseException], ...] = (TooLongError, RecursionError, *smt.troubles())
     undecided: list[str] = []
     compared: list[ComparedPart] = []
     for what, steps in _steps(versions):
@@ -73,7 +65,7 @@ def compare(
         tuple(undecided),
         pairs,
         dict(versions.kinds),
-        tuple(named_otherwise(before, after)),
+        tuple(_required(before, after)),
     )
 
 
@@ -132,6 +124,32 @@ def _stops(stops: Sequence[Mapping[str, Sequence[str]]], table: str) -> Iterator
     before, after = (stop.get(table, ()) for stop in stops)
     yield from (f"`{name}` no longer stops the cycle where it fails" for name in before if name not in after)
     yield from (f"`{name}` newly stops the cycle where it fails" for name in after if name not in before)
+
+
+def _required(before: Program, after: Program) -> Iterator[str]:
+    """Say of each place that names other requirements than before which are new and which are gone; no meaning changes with that.
+
+    A line that was renamed is another place.
+    """
+    old, new = dict(_places(before)), dict(_places(after))
+    for place in dict.fromkeys((*old, *new)):
+        gone = [name for name in old.get(place, ()) if name not in new.get(place, ())]
+        more = [name for name in new.get(place, ()) if name not in old.get(place, ())]
+        told = [f"{word} {', '.join(names)}" for word, names in (("new", more), ("gone", gone)) if names]
+        if told:
+            yield f"{place}: {'; '.join(told)}"
+
+
+def _places(program: Program) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Give each place of a program that can name requirements, in words, and those that it names."""
+    for table in program.tables:
+        yield f"table `{table.name}`", table.requirements
+        for line in table.every_line:
+            yield f"table `{table.name}`, line {line.name}", line.requirements
+    yield from ((f"procedure `{one.name}`", one.requirements) for one in program.procedures)
+    yield from ((f"assumption `{one.name}`", one.requirements) for one in program.assumptions)
+    yield from ((f"invariant `{one.name}`", one.requirements) for one in program.invariants)
+    yield from ((f"property `{one.name}`", one.requirements) for one in program.properties)
 
 
 def difference(

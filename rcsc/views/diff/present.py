@@ -21,15 +21,15 @@ from rcsc.lang.model import (
     Value,
     value_of_key,
 )
+from rcsc.proof.relation.effect import Meaning, Shared
 from rcsc.proof.relation.follow import loosened
+from rcsc.proof.relation.questions import stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.effect import Meaning, Shared
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import Node
-from rcsc.proof.table.cover import Space, UndecidedError
 from rcsc.views.diff.changes.difference import Change, ComparedPart, ProgramDifference
 from rcsc.views.diff.changes.tables import assumed
 
@@ -115,7 +115,7 @@ class _Cycle:
     ) -> None:
         self.difference, self.level, self.options = difference, level, options
         self.numbers = count(1)
-        self.kinds = {str(v.name): v.type for v in program.variables}
+        self.kinds = program.kinds
         self.program = program
         start = {
             str(v.name): values.variable(v.name, v.type)
@@ -123,7 +123,7 @@ class _Cycle:
             else values.constant(v.type, now[v.name])
             for v in program.variables
         }
-        run = Run({str(p.name): p for p in program.procedures}, self.kinds, start)
+        run = Run.of(program, start)
         self.inputs = self._leaves(run)
         run.settle(program)
         self.settled = self._leaves(run)
@@ -156,13 +156,12 @@ class _Cycle:
         )
         if whole.known:
             return bool(whole.low)
-        given_up: tuple[type[BaseException], ...] = (UndecidedError, RecursionError, *smt.troubles())
+        given_up: tuple[type[BaseException], ...] = (RecursionError, *smt.troubles())
         try:
-            space = Space(values.variables([whole]).values(), (), self.options)
             bounds = list(loosened([whole], self.numbers))  # before there are terms
-            solver = space.solver(whole)
+            solver = stated([whole], self.options)
             solver.add(*bounds)
-            return space.answered(solver)
+            return solver.possible()
         except given_up:
             return True
 
@@ -185,14 +184,8 @@ def knows(program: Program, table: Table, leaf: str, value: Value, options: Opti
     Raises:
         UndecidedError: The solver gave up.
     """
-    kinds = {str(v.name): v.type for v in program.variables}
-    shared = Shared()
-    for name, kind in kinds.items():
-        shared.start[name] = shared.canonical(values.variable(name, kind))
-    meaning = Meaning(program, kinds, shared)
-    known = assumed(program, table, meaning)
-    here = values.equal(shared.start[leaf], values.constant(kinds[leaf], value))
-    whole = shared.canonical(values.all_of([known, here, values.any_of(meaning.lines(table))]))
-    if whole.known:
-        return bool(whole.low)
-    return Space(values.variables([whole]).values(), (), options).possible(whole)
+    shared = Shared(program.kinds)
+    meaning = Meaning(program, shared)
+    here = values.equal(shared.start[leaf], values.constant(shared.kinds[leaf], value))
+    whole = [assumed(table, meaning), here, values.any_of(meaning.lines(table))]
+    return stated(whole, options).possible()

@@ -29,7 +29,7 @@ from rcsc.lang.model import (
 from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
-from rcsc.proof.relation.steps import MOST_STATES, Step, Steps, UnansweredError
+from rcsc.proof.relation.steps import MOST_STATES, Step, Steps
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.views.graph import labels
@@ -75,15 +75,9 @@ def derive(
             return _Derivation(
                 program, table, file, written, Steps(program, table, chosen, options)
             ).derived()
-    except UnansweredError:
-        return _undecided(table)
     except smt.troubles():
-        return _undecided(table)
-
-
-def _undecided(table: Table) -> Diagnostic:
-    message = f"the steps of table `{table.name}` are not decided within the limits"
-    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
+        message = f"the steps of table `{table.name}` are not decided within the limits"
+        return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
 
 
 def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
@@ -147,7 +141,7 @@ class _Derivation:
         states = self.steps.states()
         steps = self.steps.steps(states)
         edges: list[Edge] = []
-        for at, line in enumerate(self._lines()):
+        for at, line in enumerate(self.table.every_line):
             edges += self._edges(at, line, [step for step in steps if step.line == at], states)
         common = self._common(edges)
         values = {self._spelled(value): value for value in states}
@@ -171,18 +165,15 @@ class _Derivation:
                 if isinstance(declaration, tree.Use)
             ),
             self._columns(),
-            tuple(line.name for line in self._lines()),
+            tuple(line.name for line in self.table.every_line),
             used,
         )
         return Derived(graph, labels.guard(common), tuple(self.lost))
 
     # --- words ---
 
-    def _lines(self) -> list[Line | Default]:
-        return [*self.table.lines, *([self.table.default] if self.table.default else [])]
-
     def _row(self, at: int) -> tree.Row:
-        name = self._lines()[at].name
+        name = self.table.every_line[at].name
         return next(row for row in self.written.rows if row.name == name)
 
     def _spelled(self, value: Value) -> str:
@@ -250,7 +241,7 @@ class _Derivation:
         if base.default:
             return [replace(base, target=ANY if goal is None else self._spelled(goal))]
         self.lost.append(
-            f"line `{self._lines()[at].name}` matches nothing under the assumptions and has no edge"
+            f"line `{self.table.every_line[at].name}` matches nothing under the assumptions and has no edge"
         )
         return []
 
@@ -266,7 +257,7 @@ class _Derivation:
         before = " and ".join(stated)
         if before != again and not self._row(at).default:
             written, then = (f"`{text}`" if text else "a blank" for text in (before, again))
-            name = self._lines()[at].name
+            name = self.table.every_line[at].name
             self.lost.append(f"line `{name}`: {written} under `{self.steps.state.name}` comes back as {then}")
 
     def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
@@ -290,7 +281,7 @@ class _Derivation:
     def _eased(self, edge: Edge, common: list[tree.Expr], values: Mapping[str, Value]) -> Edge:
         if edge.default:
             return edge
-        at = next(at for at, line in enumerate(self._lines()) if line.name == edge.line)
+        at = next(at for at, line in enumerate(self.table.every_line) if line.name == edge.line)
         source = None if edge.source == ANY else values[edge.source]
         terms = self._terms(at, self.steps.needed(at, source))
         if source is not None:

@@ -11,9 +11,9 @@ from rcsc.lang.model import Program, Table
 from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.proof.relation.follow import Follow, following
-from rcsc.proof.relation.steps import UnansweredError
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.views.graph import labels
 from rcsc.views.graph.derive import Derived
 from rcsc.views.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
@@ -27,7 +27,7 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
     try:
         with smt.together(options.drawn):
             follows = following(program, table, options)
-    except UnansweredError:
+    except UndecidedError:
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
     written = next(

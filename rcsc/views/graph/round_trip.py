@@ -76,7 +76,7 @@ def against(
     if not isinstance(resolved, Program):
         shown = tuple(_renamed(diagnostic, table.file, name) for diagnostic in resolved)
         return Against(shown, sources={**loaded.sources, name: Source(name, text)})
-    other = next(candidate for candidate in resolved.tables if candidate.name == table.name)
+    other = resolved.table(table.name)
     verdict = compare((program, table), (resolved, other), options)
     if isinstance(verdict, Same) and set(other.assumptions) != set(table.assumptions):
         return Against((_assuming(table, other),))

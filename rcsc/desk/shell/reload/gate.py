@@ -28,7 +28,7 @@ from rcsc.lang.interpret import (
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Enum, Expr, Kind, Level, Program, Table, Value, pending, spell
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.table.cover import UndecidedError
+from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.run.buffers import Buffers
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import FAULTS, Signature, Values

@@ -16,7 +16,8 @@ from rcsc.lang.model import Program, Table, Value, spell
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.written.tables import table_of
-from rcsc.proof.relation.steps import Steps, UnansweredError
+from rcsc.proof.relation.steps import Steps
+from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.views.graph.formats.state_graph import StateGraph
 
 
@@ -135,5 +136,5 @@ def _leads(program: Program, name: str, line: str, state: str, workspace: Worksp
     try:
         steps = _steps(program, table, state, workspace)
         return new is not None and [steps.sets(action) for action in new.actions] == [goal]
-    except UnansweredError:
+    except UndecidedError:
         return False

@@ -95,8 +95,8 @@ def kind_of(kinds: Mapping[str, Scalar], name: str) -> Scalar:
 
 
 def words_of(program: Program, table: Table) -> Words | None:
-    """Return the words that the table's tests split; None where some test is no box of leaves or of parts."""
-    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    """The words that the table's tests take apart; None where some test is no box, of leaves or of parts."""
+    kinds: dict[str, Scalar] = program.kinds
     tests = table.distinct_tests
     looked_at: dict[str, list[Test]] = {}
     for test in tests:

@@ -17,7 +17,6 @@ Trusted for *same meaning*: `align` (that the same leaf means the same), `symbol
 question a line pair whose regions meet; parts whose digests agree are not asked.
 
 Modules, in the order the data flows: `align` puts both over one set of variables, `versions` under one solver.
-`tables` compares tables, `parts` what is none, `follows` which line follows which, `traces` the state graph;
-`requirements` compares what parts are for, which is no meaning; `contrast` says where two effects differ,
-`value_text` gives values in the language's words. What is found is a `difference`.
+`tables` compares tables, `parts` what is none, `cycles` the state graph, and which line follows which; `contrast` says
+where two effects differ, `value_text` gives values in the language's words. What is found is a `difference`.
 """

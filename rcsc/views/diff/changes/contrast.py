@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from rcsc.lang.interpret import UNDEFINED, ExternError
 from rcsc.lang.model import Program
 from rcsc.lang.model import Value as Scalars
+from rcsc.proof.relation.effect import CALLS, RUN, differences, value_after
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.effect import goes_wrong_otherwise, same_calls, value_after
 from rcsc.proof.symbolic.values import TRUE, Node
 from rcsc.views.diff.changes.difference import Change, PartSort, Value, Where
 from rcsc.views.diff.changes.value_text import in_words, number
@@ -25,7 +25,8 @@ from rcsc.views.diff.changes.versions import (
     is_hard,
 )
 
-RUN, CALLS = "", "extern calls"
+_NAMES = {RUN: "the end of the run", CALLS: "extern calls"}
+"""What is no leaf."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class Contrast:
         long: list[str] = []
         for leaf, node in self.differ.items():
             text = in_words(self._unequal(leaf)) if leaf not in (RUN, CALLS) else in_words(node)
-            (parts if text else long).append(text or f"{leaf or 'the end of the run'} differs")
+            (parts if text else long).append(text or f"{_NAMES.get(leaf, leaf)} differs")
         return " or ".join((*parts, *long))
 
     def _unequal(self, leaf: str) -> Node:
@@ -122,7 +123,11 @@ class Contrast:
                 ", ".join(call.spelled.split()[0] for call in effect.calls) or "none" for effect in effects
             ]
             return Value(
-                CALLS, (), names[0], names[1] if names[0] != names[1] else "with other values", ("", "")
+                _NAMES[CALLS],
+                (),
+                names[0],
+                names[1] if names[0] != names[1] else "with other values",
+                ("", ""),
             )
         kind = self.versions.types[leaf]
         nodes = [value_after(effect, leaf, self.versions.shared) for effect in effects]
@@ -155,21 +160,12 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
     Raises:
         UndecidedError: The solver gave up.
     """
-    before, after = (doing.effect for doing in pair)
-    shared = versions.shared
-    good = shared.canonical(values.both(before.good, after.good))
-    asked = {RUN: goes_wrong_otherwise(before, after, shared)}
-    asked[CALLS] = values.both(good, values.negation(same_calls(before, after, versions.leaves, shared)))
-    for leaf in versions.leaves:
-        if leaf in before.leaves or leaf in after.leaves:
-            pair_ = [value_after(effect, leaf, shared) for effect in (before, after)]
-            asked[leaf] = values.both(good, values.negation(shared.equal(*pair_)))
-    differences = {}
-    for leaf, node in asked.items():
-        differ = shared.canonical(node)
-        if versions.meet(region, differ):
-            differences[leaf] = differ
-    return Contrast(versions, region, pair, differences)
+    shared, (before, after) = versions.shared, (doing.effect for doing in pair)
+    asked = {
+        leaf: shared.canonical(node) for leaf, node in differences(before, after, versions.leaves, shared)
+    }
+    differ = {leaf: node for leaf, node in asked.items() if versions.meet(region, node)}
+    return Contrast(versions, region, pair, differ)
 
 
 def changes(

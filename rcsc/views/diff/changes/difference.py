@@ -143,7 +143,6 @@ class Traces:
     level: str
     new: tuple[Transition, ...]
     gone: tuple[Transition, ...]
-    queries: int
 
 
 @dataclass(frozen=True, slots=True)

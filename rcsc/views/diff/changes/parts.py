@@ -33,8 +33,8 @@ from rcsc.lang.model import (
     Statement,
     Value,
 )
+from rcsc.proof.relation.effect import Effect, Meaning
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.effect import Effect, Meaning
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.views.diff.changes.contrast import changes, contrast
 from rcsc.views.diff.changes.difference import Basis, Change, ComparedPart, PartSort
@@ -105,7 +105,7 @@ def _effects(
 ) -> ComparedPart:
     """Where two effects differ, all inputs free."""
     before = versions.queries
-    old, new = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
+    old, new = (Doing(effect, run, {}) for effect, run in zip(pair, runners, strict=True))
     contrasted = contrast(versions, TRUE, (old, new))
     changed = (
         changes(versions, PartSort.EFFECT, (name, name), TRUE, TRUE, contrasted) if contrasted.differ else []

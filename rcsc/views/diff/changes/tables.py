@@ -4,46 +4,20 @@ In: two tables over shared leaves. Out: a `ComparedPart`. Inputs at which the ve
 other; when the solver finds no more, that is the proof that nothing else changed.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 from rcsc.lang.interpret import execute, matching_lines
 from rcsc.lang.leaves import everything, written_by
 from rcsc.lang.model import Action, Bool, Call, Program, Statement, Table, Value
-from rcsc.proof.relation.same import NO_LINE, SEVERAL_LINES
+from rcsc.proof.relation.effect import Meaning
+from rcsc.proof.relation.same import NO_LINE, SEVERAL_LINES, UNDEFINED, Outcome, outcomes
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.effect import Meaning, several
-from rcsc.proof.symbolic.values import TRUE, Node
+from rcsc.proof.symbolic.values import Node
 from rcsc.views.diff.changes.contrast import Contrast, changes, contrast
 from rcsc.views.diff.changes.difference import Basis, Change, ComparedPart, PartSort
 from rcsc.views.diff.changes.versions import Doing, Versions, is_hard
-
-UNDEFINED = "a condition that is undefined"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class InputOutcome:
-    """What can become of an input.
-
-    Attributes:
-        name: Of the line; of a fault what it is.
-        label: `line 3`, or the fault.
-        when: At which inputs.
-        holds: The conditions of the line, without what makes it the only one.
-        actions: None for a fault.
-    """
-
-    name: str
-    label: str
-    when: Node
-    holds: Node = TRUE
-    actions: tuple[Action, ...] | None = None
-
-    @property
-    def key(self) -> tuple[bool, str]:
-        """Equal for equal outcomes of two versions."""
-        return self.actions is None, self.name
 
 
 def table_part(versions: Versions, before: Table, after: Table) -> ComparedPart:
@@ -102,34 +76,21 @@ class _Comparison:
     def __init__(self, versions: Versions, before: Table, after: Table) -> None:
         self.versions, self.tables = versions, (before, after)
         self.meanings = versions.meanings()
-        self.outcomes = tuple(
-            {out.key: out for out in _outcomes(table, meaning)}
-            for table, meaning in zip(self.tables, self.meanings, strict=True)
-        )
-        self.relied = versions.shared.canonical(
-            values.any_of(
-                assumed(program, table, meaning)
-                for program, table, meaning in zip(
-                    (versions.before, versions.after), self.tables, versions.meanings(), strict=True
-                )
-            )
-        )
+        self.outcomes = tuple(map(_outcomes, self.tables, self.meanings))
+        self.relied = versions.shared.canonical(values.any_of(map(assumed, self.tables, versions.meanings())))
 
     def part(self) -> ComparedPart:
         """The table as a part: everything that changed."""
         versions, before = self.versions, self.versions.queries
         changed: list[Change] = []
         moved: list[Change] = []
-        first, second = (list(outs) for outs in self.outcomes)
-        kept = [(self.outcomes[0][key], self.outcomes[1][key]) for key in first if key in second]
-        pairs = [
-            *((outcome, two) for outcome, two in kept if self._bodies_differ(outcome, two)),
-            *self._pairs(kept),
+        first, second = (list(outs.values()) for outs in self.outcomes)
+        kept = [
+            (out, self.outcomes[1][key]) for key, out in self.outcomes[0].items() if key in self.outcomes[1]
         ]
-        for outcome, two in sorted(
-            pairs, key=lambda both: (first.index(both[0].key), second.index(both[1].key))
-        ):
-            for change in self._compared(outcome, two):
+        pairs = [*(pair for pair in kept if self._bodies_differ(*pair)), *self._pairs(kept)]
+        for pair in sorted(pairs, key=lambda pair: (first.index(pair[0]), second.index(pair[1]))):
+            for change in self._compared(*pair):
                 (moved if change.sort is PartSort.LINE else changed).append(change)
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         return ComparedPart(
@@ -137,7 +98,7 @@ class _Comparison:
             versions.queries - before, space.volume(space.nodes),
         )  # fmt: skip
 
-    def _bodies_differ(self, before: InputOutcome, after: InputOutcome) -> bool:
+    def _bodies_differ(self, before: Outcome, after: Outcome) -> bool:
         """Whether a line's actions, and all that they call, are not word for word the same."""
         if before.actions is None or after.actions is None:
             return False
@@ -147,9 +108,7 @@ class _Comparison:
         )
         return first != second
 
-    def _pairs(
-        self, kept: list[tuple[InputOutcome, InputOutcome]]
-    ) -> list[tuple[InputOutcome, InputOutcome]]:
+    def _pairs(self, kept: list[tuple[Outcome, Outcome]]) -> list[tuple[Outcome, Outcome]]:
         """Every pair of outcomes with different names that some input has."""
         versions = self.versions
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
@@ -167,23 +126,21 @@ class _Comparison:
         versions.queries += space.queries
         return pairs
 
-    def _compared(self, before: InputOutcome, after: InputOutcome) -> list[Change]:
+    def _compared(self, before: Outcome, after: Outcome) -> list[Change]:
         """What changed where one version has the first outcome and the other the second."""
         versions = self.versions
         both = versions.shared.canonical(values.both(before.when, after.when))
         if both not in versions.stated:
             versions.stated[both] = versions.shared.canonical(values.both(before.holds, after.holds))
-        labels = before.label, after.label
+        labels = _label(self.tables[0], before), _label(self.tables[1], after)
         if before.actions is None or after.actions is None:
             return self._confirmed(
                 changes(versions, PartSort.FAULT, labels, both, self.relied), before, after
             )
         doing = [
-            Doing(out.label, meaning.effect(_body(out.actions), (before.holds, after.holds)), partial(_run, _body(out.actions)),
-                  _headings(program, out.actions))
-            for out, meaning, program in zip(
-                (before, after), self.meanings, (versions.before, versions.after), strict=True
-            )
+            Doing(meaning.effect(_body(out.actions), (before.holds, after.holds)), partial(_run, _body(out.actions)),
+                  _headings(meaning.program, out.actions))
+            for out, meaning in zip((before, after), self.meanings, strict=True)
         ]  # fmt: skip
         contrasted = contrast(versions, both, (doing[0], doing[1]))
         changed = (
@@ -191,7 +148,7 @@ class _Comparison:
             if contrasted.differ
             else []
         )
-        if before.key != after.key:
+        if (before.actions is None, before.name) != (after.actions is None, after.name):
             changed += self._moved(labels, both, contrasted)
         return self._confirmed(changed, before, after)
 
@@ -205,7 +162,7 @@ class _Comparison:
             return []
         return changes(versions, PartSort.LINE, labels, alike)
 
-    def _confirmed(self, changed: list[Change], before: InputOutcome, after: InputOutcome) -> list[Change]:
+    def _confirmed(self, changed: list[Change], before: Outcome, after: Outcome) -> list[Change]:
         """Confirm each witness by the reference meaning: it must match as is said.
 
         Raises:
@@ -219,7 +176,7 @@ class _Comparison:
                     self._match(program, table, out, change)
         return changed
 
-    def _match(self, program: Program, table: Table, out: InputOutcome, change: Change) -> None:
+    def _match(self, program: Program, table: Table, out: Outcome, change: Change) -> None:
         now = self.versions.snapshot(program, dict(change.point))
         seen = matching_lines(table, now)
         default = table.default
@@ -233,35 +190,27 @@ class _Comparison:
             raise RuntimeError(f"table {table.name}: {change.witness} meets {name}, not {out.name}")
 
 
-def assumed(program: Program, table: Table, meaning: Meaning) -> Node:
+def assumed(table: Table, meaning: Meaning) -> Node:
     """The condition that the table's assumptions and the program's invariants hold."""
-    conditions = [a.condition for a in program.assumptions if a.name in table.assumptions]
-    conditions += [invariant.condition for invariant in program.invariants]
-    return values.all_of(meaning.condition(condition) for condition in conditions)
+    invariants = (meaning.condition(invariant.condition) for invariant in meaning.program.invariants)
+    return values.all_of([*meaning.assumed(table), *invariants])
 
 
-def _outcomes(table: Table, meaning: Meaning) -> Iterable[InputOutcome]:
-    """All outcomes of an input: exactly one comes about."""
-    lines = meaning.lines(table)
-    fine = values.all_of(values.negation(bad) for bad in meaning.bad)
-    many, canonical = several(lines), meaning.shared.canonical
-    alone = values.both(fine, values.negation(many))
-    for line, holds in zip(table.lines, lines, strict=True):
-        yield InputOutcome(
-            str(line.name),
-            f"line `{line.name}`",
-            canonical(values.both(alone, holds)),
-            canonical(holds),
-            line.actions,
-        )
-    nothing = canonical(values.both(fine, values.negation(values.any_of(lines))))
-    default = table.default
-    if default is None:
-        yield InputOutcome(NO_LINE, NO_LINE, nothing)
-    else:
-        yield InputOutcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
-    yield InputOutcome(SEVERAL_LINES, SEVERAL_LINES, canonical(values.both(fine, many)))
-    yield InputOutcome(UNDEFINED, UNDEFINED, canonical(values.negation(fine)))
+def _outcomes(table: Table, meaning: Meaning) -> dict[tuple[bool, str], Outcome]:
+    """What can become of an input, in order of the table; equal outcomes of two versions have equal keys."""
+    canonical = meaning.shared.canonical
+    return {
+        (out.actions is None, out.name): replace(out, when=canonical(out.when), holds=canonical(out.holds))
+        for out in outcomes(meaning, table)
+    }
+
+
+def _label(table: Table, out: Outcome) -> str:
+    """The outcome in words: `line 3`, or the fault."""
+    if out.actions is None:
+        return "a condition that is undefined" if out.name == UNDEFINED else out.name
+    default = table.default is not None and table.default.name == out.name
+    return f"{'DEFAULT' if default else 'line'} `{out.name}`"
 
 
 def _body(actions: tuple[Action, ...] | None) -> list[Statement]:

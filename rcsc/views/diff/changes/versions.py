@@ -27,10 +27,10 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.model import Value as Scalars
+from rcsc.proof.relation.effect import Effect, Meaning, Shared
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.symbolic import trial, values
-from rcsc.proof.symbolic.effect import Effect, Meaning, Shared
 from rcsc.proof.symbolic.values import CONSTANT, Node
 from rcsc.proof.table.cells import region
 from rcsc.proof.table.cover import Cover, Space
@@ -73,12 +73,10 @@ class Doing:
     """What one version does in a region.
 
     Attributes:
-        label: What does it: `line 3`.
         run: The same by the reference meaning.
         headings: For each leaf that it may write, of the actions that do.
     """
 
-    label: str
     effect: Effect
     run: Runner
     headings: Mapping[str, tuple[str, ...]]
@@ -102,14 +100,13 @@ class Versions:
         self.digests = Digests(aligned.before), Digests(aligned.after)
         self.types = {str(v.name): v.type for v in (*aligned.after.variables, *aligned.before.variables)}
         self.kinds = {**self.types, **aligned.leaves}
-        self.shared = Shared()
+        befores = {
+            str(earlier(name)): kind for name, kind in self.kinds.items()
+        }  # what a property calls them
+        self.shared = Shared({**self.kinds, **befores})
         words = bits_alone((*_expressions(aligned.before), *_expressions(aligned.after)), self.kinds)
-        for name, kind in self.kinds.items():
-            start = self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
-            if name in words:
-                start.term = smt.word(name, words[name])
-            before = earlier(name)  # what a property calls it; no run begins with it
-            self.shared.start[before] = self.shared.canonical(values.variable(before, kind))
+        for name, word in words.items():
+            self.shared.start[name].term = smt.word(name, word)
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.queries = 0
         self.spare = smt.Budget(COVER_STEPS)
@@ -120,8 +117,7 @@ class Versions:
 
     def meanings(self) -> tuple[Meaning, Meaning]:
         """What conditions and actions of either version mean."""
-        before, after = (Meaning(program, self.kinds, self.shared) for program in (self.before, self.after))
-        return before, after
+        return Meaning(self.before, self.shared), Meaning(self.after, self.shared)
 
     def space(self, *nodes: Node) -> Space:
         """All inputs that the nodes speak of."""

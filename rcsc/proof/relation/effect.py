@@ -62,14 +62,20 @@ class Effect:
 
 
 class Shared:
-    """Hash-consed nodes, and the leaves that all runs begin with."""
+    """Hash-consed nodes, and the leaves that all runs begin with.
 
-    def __init__(self) -> None:
-        self.start: dict[str, Node] = {}
+    Attributes:
+        kinds: The type of each of these leaves.
+        start: Each as a value.
+    """
+
+    def __init__(self, kinds: Mapping[str, Scalar]) -> None:
+        self.kinds = kinds
         self._known: dict[tuple[object, ...], Node] = {}
         self._of: dict[Node, Node] = {}
         self._bare: dict[tuple[object, ...], int] = {}
         self._number: dict[Node, int] = {}
+        self.start = {name: self.canonical(values.variable(name, kind)) for name, kind in kinds.items()}
 
     def canonical(self, node: Node) -> Node:
         """Return the node that stands for all built alike."""
@@ -136,7 +142,6 @@ class Meaning:
     """
 
     program: Program
-    kinds: Mapping[str, Scalar]
     shared: Shared
     bad: list[Node] = field(default_factory=list)
     _procedures: dict[str, Procedure] = field(init=False)
@@ -145,7 +150,7 @@ class Meaning:
         self._procedures = {str(procedure.name): procedure for procedure in self.program.procedures}
 
     def _run(self) -> _Followed:
-        return _Followed(self._procedures, self.kinds, self.shared.start)
+        return _Followed(self._procedures, self.shared.kinds, self.shared.start)
 
     def condition(self, expr: Expr) -> Node:
         """Evaluate a condition; add to `bad` where it is undefined."""
@@ -162,6 +167,15 @@ class Meaning:
         return [
             values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
         ]
+
+    def every_line(self, table: Table) -> list[Node]:
+        """Return where each line matches, looking at no other, and where DEFAULT does if the table has one."""
+        lines = self.lines(table)
+        return lines if table.default is None else [*lines, values.negation(values.any_of(lines))]
+
+    def assumed(self, table: Table) -> list[Node]:
+        """Return where each assumption holds that the table's proof may use."""
+        return [self.condition(assumption.condition) for assumption in self.program.assumed(table)]
 
     def effect(self, body: Iterable[Statement], given: Iterable[Node] = ()) -> Effect:
         """Follow the statements where all of `given` holds.

@@ -9,18 +9,19 @@ input for which they do not, and `meeting` one for which it is said.
 It costs some inputs that are tried, and a question a variable that none of them shows to be left different.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from rcsc.base.diagnostics.diagnostic import Effects
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Expr, Line, Program, Table, Value, VariableName
+from rcsc.lang.model import Expr, Line, Program, Table, Value
+from rcsc.proof.relation.effect import Meaning, Shared, differences, value_after
+from rcsc.proof.relation.questions import stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
-from rcsc.proof.solvers.smt import Answer, Solver
+from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import trial, values
-from rcsc.proof.symbolic.effect import Meaning, Shared, differences, value_after
 from rcsc.proof.symbolic.encode import Frame, least_witness
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.execution import Run
@@ -78,13 +79,13 @@ def meeting(program: Program, table: Table, where: Expr, options: Options) -> Ma
     """Find some input in `where` that the table's assumptions admit: what is looked at; else that there is none, or `UNKNOWN`."""
     if _over("whether two lines meet"):
         return Answer.UNKNOWN
-    relied = [each.condition for each in program.assumptions if each.name in table.assumptions]
-    seen = trial.aimed([where, *relied], program.variables)
+    there = [where, *_relied(program, table)]
+    seen = trial.aimed(there, program.variables)
     if seen is not None:
-        read = {str(name) for each in (where, *relied) for name in read_by(each)}
+        read = {str(name) for each in there for name in read_by(each)}
         return {name: value for name, value in seen.items() if name in read}
     try:
-        nodes = list(_here(program, table, [where], _starting(program)))
+        nodes = list(map(Run.of(program, {}).evaluate, there))
         return answered(("meeting",), nodes, lambda: _point(nodes, options))
     except smt.troubles():
         return Answer.UNKNOWN
@@ -119,19 +120,14 @@ def _over(what: str) -> bool:
     return smt.gives_up(what)
 
 
+def _relied(program: Program, table: Table) -> list[Expr]:
+    """What the table may rely on."""
+    return [assumption.condition for assumption in program.assumed(table)]
+
+
 def _spelled(line: Line) -> list[object]:
     """The line's statements, which say all that it does."""
     return [action.statement for action in line.actions]
-
-
-def _starting(program: Program) -> Shared:
-    """The leaves that all runs begin with."""
-    shared = Shared()
-    for variable in program.variables:
-        shared.start[str(variable.name)] = shared.canonical(
-            values.variable(str(variable.name), variable.type)
-        )
-    return shared
 
 
 class _Comparison:
@@ -142,25 +138,23 @@ class _Comparison:
     """
 
     def __init__(self, program: Program, table: Table, lines: tuple[Line, Line], where: Expr | None) -> None:
-        self.program, self.shared = program, _starting(program)
-        kinds = {str(variable.name): variable.type for variable in program.variables}
-        meaning = Meaning(program, kinds, self.shared)
+        self.program, self.shared = program, Shared(program.kinds)
+        meaning = Meaning(program, self.shared)
         self.first, self.second = (
             meaning.effect(action.statement for action in line.actions) for line in lines
         )
         self.changes = [
             (name, change)
-            for name, change in differences(self.first, self.second, list(kinds), self.shared)
+            for name, change in differences(self.first, self.second, program.kinds, self.shared)
             if change is not values.FALSE
         ]
         tests = [test.condition for line in lines for test in line.tests if test is not None]
-        self._stated = table, tests if where is None else [where]
+        self._there = [*(tests if where is None else [where]), *_relied(program, table)]
 
     @cached_property
     def here(self) -> list[Node]:
         """What holds where they are compared."""
-        table, conditions = self._stated
-        return list(_here(self.program, table, conditions, self.shared))
+        return list(map(Run.of(self.program, self.shared.start).evaluate, self._there))
 
     def effects(self, options: Options, near: Mapping[str, Value]) -> Effects:
         """Say what can be left different, each name for itself."""
@@ -181,9 +175,9 @@ class _Comparison:
         wanted = values.any_of(change for _, change in self.changes)
         nodes = [*self.here, wanted]
         free = values.variables(nodes)
-        kinds = {variable.name: variable for variable in self.program.variables}
+        kinds = self.program.kinds
         shown = [variable for variable in self.program.variables if str(variable.name) in free]
-        solver = _stated(nodes, options)
+        solver = stated(nodes, options)
         frame = Frame({name: values.term_of(node) for name, node in free.items()})
         witness = least_witness(
             solver, shown, frame, smt.Budget(WRONG_STEPS), trial.met(self.here, [wanted], near).get(wanted)
@@ -193,40 +187,24 @@ class _Comparison:
         results = []
         for name, change in self.changes:
             if name in kinds and solver.check(values.term_of(change)) is Answer.SATISFIABLE:
-                kind = kinds[VariableName(name)].type
+                kind = kinds[name]
                 after = (value_after(effect, name, self.shared) for effect in (self.first, self.second))
                 one, other = (solver.value(values.term_of(node), kind) for node in after)
                 results.append((name, one, other))
         return Disagreement(witness, tuple(results))
 
 
-def _here(program: Program, table: Table, conditions: Iterable[Expr], shared: Shared) -> Iterator[Node]:
-    """Yield these conditions, and the table's assumptions."""
-    run = Run({}, {str(variable.name): variable.type for variable in program.variables}, shared.start)
-    yield from map(run.evaluate, conditions)
-    for assumption in program.assumptions:
-        if assumption.name in table.assumptions:
-            yield run.evaluate(assumption.condition)
-
-
 def _possible(nodes: list[Node], options: Options) -> Answer:
     if _over("whether anything is so"):
         return Answer.UNKNOWN
-    return answered(("possible",), nodes, lambda: _stated(nodes, options).check())
+    return answered(("possible",), nodes, lambda: stated(nodes, options).check())
 
 
 def _point(nodes: list[Node], options: Options) -> Mapping[str, Value] | Answer:
     """Values for which all nodes hold; else Z3's answer."""
-    solver = _stated(nodes, options)
+    solver = stated(nodes, options)
     answer = solver.check()
     if answer is not Answer.SATISFIABLE:
         return answer
     free = values.variables(nodes)
     return {name: solver.value(values.term_of(node), node.kind) for name, node in free.items()}
-
-
-def _stated(nodes: list[Node], options: Options) -> Solver:
-    """A solver that knows that all nodes hold."""
-    solver = Solver(options.limits)
-    solver.add(*values.domain(values.variables(nodes).values()), *map(values.term_of, nodes))
-    return solver
