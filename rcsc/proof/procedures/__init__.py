@@ -27,5 +27,5 @@ found. Obligations that bounds settle cost none.
 
 Modules, in the order the data flows: `obligations` lists what a program owes, `discharge` puts it to Z3, `causes`
 gathers by cause what is not shown; `invariants` shows that invariants hold at first and that assumptions can hold
-together, `together` the same of tables that run in one cycle; `meetings` that lines which are said to do the same do.
+together, also those of tables that run in one cycle; `meetings` that lines which are said to do the same do.
 """

@@ -4,6 +4,8 @@ In: a program. Out: diagnostics. That every run keeps each invariant is shown wi
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import combinations, product
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
@@ -12,8 +14,10 @@ from rcsc.lang.interpret import initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Assumption,
+    AssumptionName,
     Invariant,
     Kind,
+    Level,
     Program,
     Property,
     Snapshot,
@@ -24,6 +28,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.restart import Fixed
+from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer
 
@@ -118,9 +123,8 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
 
 
 def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
-    """Return the assumptions of the table and every invariant of the program."""
-    named = (assumption for assumption in program.assumptions if assumption.name in table.assumptions)
-    return (*named, *program.invariants)
+    """The assumptions of the table, and every invariant of the program."""
+    return (*program.assumed(table), *program.invariants)
 
 
 def _trials(program: Program) -> Iterator[dict[str, Value]]:
@@ -131,3 +135,50 @@ def _trials(program: Program) -> Iterator[dict[str, Value]]:
             variable.name: value_of_key(variable.type, key_bounds(variable.type)[end])
             for variable in program.variables
         }
+
+
+# --- tables that run in one cycle ---
+
+
+def assumed_together(program: Program, options: Options) -> Iterator[Diagnostic]:
+    """Yield an error for each two tables of one level that assume of the inputs what cannot hold together.
+
+    Each is proved under its own assumptions, and in every cycle one of them fails. What a stage before writes may differ from table to
+    table, and is left out; so are tables of which a level runs one or the other, by its command.
+    """
+    inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
+    plain = {each.name for each in program.assumptions if inputs.issuperset(read_by(each.condition))}
+    tables = {table.name: table for table in program.tables}
+    with smt.together(options.few.steps):
+        for level in program.levels:
+            for one, other in combinations(level.choices, 2):
+                for first, second in product(one.names, other.names):
+                    if first != second:
+                        yield from _of_two(program, level, tables[first], tables[second], plain, options)
+
+
+def _of_two(
+    program: Program, level: Level, first: Table, second: Table, plain: set[AssumptionName], options: Options
+) -> Iterator[Diagnostic]:
+    """Yield an error where what both assume of the inputs is impossible, and what each assumes is not."""
+    names = [[name for name in table.assumptions if name in plain] for table in (first, second)]
+    if not all(names) or not _impossible(program, first, [*names[0], *names[1]], options):
+        return
+    if any(_impossible(program, first, each, options) for each in names):
+        return  # which is told of the table itself
+    spans = {each.name: each.span for each in program.assumptions}
+    yield Diagnostic(
+        Code.CONTRADICTORY_ASSUMPTIONS,
+        f"tables `{first.name}` and `{second.name}` of level `{level.name}` run in one cycle, and assume what cannot hold together",
+        Label(second.span),
+        related=tuple(Label(spans[name], "assumed") for name in dict.fromkeys((*names[0], *names[1]))),
+    )
+
+
+def _impossible(program: Program, table: Table, names: list[AssumptionName], options: Options) -> bool:
+    """Whether no values satisfy these assumptions and the invariants."""
+    asked = replace(table, assumptions=tuple(dict.fromkeys(names)))
+    try:
+        return assumptions_satisfiable(program, asked, options) is Answer.UNSATISFIABLE
+    except smt.troubles():
+        return False

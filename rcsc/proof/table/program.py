@@ -22,17 +22,21 @@ from rcsc.lang.model import (
     seal_of_proof,
 )
 from rcsc.proof.procedures.discharge import Tally
-from rcsc.proof.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
+from rcsc.proof.procedures.invariants import (
+    assumed_together,
+    assumptions_satisfiable,
+    at_first,
+    properties_elsewhere,
+)
 from rcsc.proof.procedures.meetings import Met, met
 from rcsc.proof.procedures.obligations import Obligations, defined_alone
-from rcsc.proof.procedures.together import assumed_together
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import TOGETHER, Options
 from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.table.certificate import program_certificate, with_witness
 from rcsc.proof.table.decide import prove_table
 from rcsc.proof.table.diagnose import diagnostics
-from rcsc.proof.table.findings.declared import declared_badly
+from rcsc.proof.table.findings.unread import declared_badly
 from rcsc.proof.table.verdict import ContradictoryAssumptions, TableFinding, TableVerdict, Undecided
 
 TOO_MANY_STEPS = f"the questions about it take, together, more than {TOGETHER} times the steps of one"

@@ -77,8 +77,8 @@ def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr],
 
 
 def _inside(program: Program, region: Region | None, witness: Witness) -> bool:
-    """Return whether a witness lies in a region of variables; false for a region of bits."""
-    kinds = {str(v.name): v.type for v in program.variables}
+    """Whether a witness lies in a region of variables; not where it is one of bits."""
+    kinds = program.kinds
     return region is not None and all(
         name in witness and holds(box, key_of(kinds[name], witness[name])) for name, box in region.items()
     )

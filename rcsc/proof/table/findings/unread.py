@@ -1,11 +1,12 @@
-"""What a program declares and nobody reads: warnings, by position.
+"""What a program declares that nobody reads, or that may not mean what its author meant: warnings, by position.
 
 In: a program, and the texts that it was made of. Out: a warning for each state and input of the root file of which nothing reads any part,
-for each constant that nothing uses, and for each member of an enumeration that nothing gives or asks for.
+for each constant that nothing uses, and for each member of an enumeration that nothing gives or asks for; and for each variable of the
+whole program of which nothing says with what it starts.
 
-Only the root file is judged, and only where it has a table or a level: what a vocabulary declares is for whoever uses it. Outputs are for
-whoever takes them, with the members that they may have; members of an input, of a link or of what an extern procedure gives come from
-outside. What the protocol makes is its own. In doubt something is read.
+Of what nobody reads only the root file is judged, and only where it has a table or a level: what a vocabulary declares is for whoever uses
+it. Outputs are for whoever takes them, with the members that they may have; members of an input, of a link or of what an extern procedure
+gives come from outside. What the protocol makes is its own. In doubt something is read.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,7 +17,21 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.scope import root_of
 from rcsc.lang.leaves import every_statement, expressions, read_by, written_by
-from rcsc.lang.model import BEFORE, Array, Declared, Enum, Expr, Kind, Program, Record, Type
+from rcsc.lang.model import (
+    BEFORE,
+    Array,
+    Declared,
+    Enum,
+    Expr,
+    Int,
+    Kind,
+    Program,
+    Real,
+    Record,
+    Type,
+    Variable,
+    spell,
+)
 from rcsc.lang.restart import After, SameAs
 from rcsc.lang.syntax import tree
 
@@ -51,6 +66,37 @@ def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnos
 
 def _warning(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
     return Diagnostic(code, message, Label(span), help=helps, severity=Severity.WARNING)
+
+
+# --- variables without a start ---
+
+
+def declared_badly(program: Program) -> Iterator[Diagnostic]:
+    """Yield a warning for each variable of which nothing says with what it starts, wherever it is declared."""
+    leaves = {variable.name: variable for variable in program.variables}
+    for declared in program.declared:
+        unsaid = next((leaf for name in declared.leaves if _starts_unsaid(leaf := leaves[name])), None)
+        if unsaid is not None:
+            yield _no_start(unsaid)
+
+
+def _starts_unsaid(leaf: Variable) -> bool:
+    kind = leaf.type
+    hidden = leaf.previous_of is not None or leaf.line_of is not None
+    return not leaf.given and not hidden and isinstance(kind, Int | Real) and not kind.low <= 0 <= kind.high
+
+
+def _no_start(leaf: Variable) -> Diagnostic:
+    kind = leaf.type
+    assert isinstance(kind, Int | Real)
+    value = spell(kind, leaf.initial)
+    ends = f"{spell(kind, kind.low)} .. {spell(kind, kind.high)}"
+    message = f"nothing says with what `{leaf.name}` starts: 0 is not in {ends}, so that it is {value}"
+    part = leaf.name.rpartition(".")[2].partition("[")[0] if "." in leaf.name else ""
+    where = f"the type of field `{part}`" if part else "its type"
+    return _warning(
+        Code.NO_START, message, leaf.span, f"write what is meant after {where}, such as `= {value}`"
+    )
 
 
 # --- states and inputs ---
