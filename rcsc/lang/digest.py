@@ -5,10 +5,10 @@ cell are left out; names of lines are not, since logs and executors show them.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from rcsc.lang.leaves import everything, expressions, read_by, written_by
+from rcsc.lang.leaves import called_by, closure, everything, expressions, read_by, written_by
 from rcsc.lang.meaning import checked
 from rcsc.lang.model import (
     Action,
@@ -104,8 +104,8 @@ class Digests:
         return repr(procedure.params) + self.body([Call(procedure.name)])
 
     def touched(self, body: Iterable[Statement], conditions: Iterable[Expr]) -> set[str]:
-        """Return the leaves that statements, all that they call, and conditions read or write."""
-        called = [self.procedures[name] for name in self.closure(body)]
+        """Leaves that statements, all that they call, and conditions read or write."""
+        called = self._called(body)
         leaves = {str(leaf) for condition in conditions for leaf in read_by(condition)}
         for part in (body, *(procedure.body for procedure in called)):
             for statement in everything(part):
@@ -115,26 +115,16 @@ class Digests:
             leaves.update((*procedure.reads, *procedure.writes))
         return leaves
 
-    def closure(self, body: Iterable[Statement]) -> list[str]:
-        """Return the procedures that run when the statements do, sorted."""
-        waiting, seen = list(_called(body)), set[str]()
-        while waiting:
-            name = waiting.pop()
-            if name not in seen:
-                seen.add(name)
-                waiting.extend(_called(self.procedures[name].body))
-        return sorted(seen)
+    def _called(self, body: Iterable[Statement]) -> list[Procedure]:
+        """The procedures that run when the statements do, by name."""
+        return [self.procedures[name] for name in sorted(closure(called_by(body), self.procedures))]
 
     def _rest(self, body: list[Statement], conditions: Iterable[Expr]) -> str:
-        """Return, as text, the definitions of the procedures called and the declarations of the variables touched."""
-        defined = [repr(replace(self.procedures[name], doc="")) for name in self.closure(body)]
+        """Procedures as they are defined, and variables as they are declared."""
+        defined = [repr(replace(procedure, doc="")) for procedure in self._called(body)]
         leaves = sorted(self.touched(body, conditions))
         declared = [(name, repr(self.variables[name].type), self.variables[name].kind) for name in leaves]
         return repr((defined, declared))
-
-
-def _called(body: Iterable[Statement]) -> Iterator[str]:
-    return (str(call.procedure) for call in everything(body) if isinstance(call, Call))
 
 
 def _stated(test: Test, known: dict[int, str]) -> str:

@@ -151,6 +151,14 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
     return operated(op, args[0].type, first, *(evaluate(arg, snapshot, local) for arg in args[1:]))
 
 
+def fold(expr: Expr, values: Mapping[str, Value] | None = None) -> Value | None:
+    """The interpreter's value, reading leaves from `values`; None where something is missing or undefined."""
+    try:
+        return evaluate(expr, values or {})
+    except (LookupError, ArithmeticError, ValueError):
+        return None
+
+
 def holds(condition: Expr | Test, snapshot: Snapshot) -> bool:
     """Return whether a condition is true of `snapshot`."""
     return bool(evaluate(condition.condition if isinstance(condition, Test) else condition, snapshot))

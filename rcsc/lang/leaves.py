@@ -165,6 +165,22 @@ def every_statement(program: Program) -> Iterator[Statement]:
             yield from everything(action.statement for action in line.actions)
 
 
+def called_by(body: Iterable[Statement]) -> Iterator[str]:
+    """Procedures that the statements themselves call, blocks included."""
+    return (str(call.procedure) for call in everything(body) if isinstance(call, Call))
+
+
+def closure(called: Iterable[str], procedures: Mapping[str, Procedure]) -> set[str]:
+    """The procedures that run when these do."""
+    waiting, seen = list(called), set[str]()
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting.extend(called_by(procedures[name].body))
+    return seen
+
+
 def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) -> frozenset[VariableName]:
     """Return the leaves that the statements may write, calls included."""
     leaves: set[VariableName] = set()

@@ -28,8 +28,7 @@ from rcsc.code.testing.executors.reference_file import EXTREMES
 from rcsc.code.testing.executors.reference_file import PRELUDE as C_PRELUDE
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.lang.expressions import intervals
-from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interpret import evaluate, matching_lines
+from rcsc.lang.interpret import evaluate, fold, matching_lines
 from rcsc.lang.model import (
     COMPARISONS,
     I64_MAX,

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interpret import matching_lines
+from rcsc.lang.interpret import fold, matching_lines
 from rcsc.lang.interval_sets import holds, joined, meet
 from rcsc.lang.model import Box, Program, Scalar, key_bounds, key_of, value_of_key
 from rcsc.proof.solvers import smt

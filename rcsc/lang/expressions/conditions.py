@@ -5,7 +5,6 @@ from functools import lru_cache
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
@@ -21,6 +20,7 @@ from rcsc.lang.expressions.typed import (
     typed,
     without_before,
 )
+from rcsc.lang.interpret import fold
 from rcsc.lang.interval_sets import compared as keys_compared
 from rcsc.lang.interval_sets import complement, joined, meet, scaled
 from rcsc.lang.leaves import read_by

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions import intervals
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.scope import Scope, normal, spell_unit
+from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
     I64_MAX,
     I64_MIN,

@@ -9,7 +9,6 @@ from typing import TypeAlias
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions import words
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.literals import as_single, integer, real
 from rcsc.lang.expressions.operators import (
     Typed,
@@ -25,6 +24,7 @@ from rcsc.lang.expressions.operators import (
 )
 from rcsc.lang.expressions.previous import before, cycles_of, lasting
 from rcsc.lang.expressions.scope import Body, Constant, Scope
+from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
     Among,
     Apply,

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.literals import as_single
 from rcsc.lang.expressions.operators import Typed, conversion, kind_word, same_kind
 from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Scope
 from rcsc.lang.expressions.typed import typed, without_before
+from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
     I64_MAX,
     I64_MIN,

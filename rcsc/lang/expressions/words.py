@@ -14,9 +14,9 @@ from functools import reduce
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, applied, kind_word
 from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.interpret import fold
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Among, Apply, Bool, Expr, Int, Literal, Read, ReadLocal, Scalar, Select, Value
 from rcsc.lang.operator_table import Arithmetic, Op, is_comparison

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
 from rcsc.lang.expressions.scope import MOST_LEAVES, Body, Constant, Scope, SetMember
 from rcsc.lang.expressions.typed import boolean, members_of
 from rcsc.lang.expressions.types import constant, point, size, type_of
+from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
     Admit,
     Array,

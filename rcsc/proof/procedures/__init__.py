@@ -25,7 +25,7 @@ cycle in which one of those fails. Trusted, without `rcsc certify`: all of it, a
 What it costs: one question for all obligations of a program where all hold; else halves, until those that fail are
 found. Obligations that bounds settle cost none.
 
-Modules, in the order the data flows: `obligations` lists what a program owes, `discharge` puts it to Z3, `causes`
+Modules, in the order the data flows: `obligations` lists what a program owes, `discharge` puts it to Z3 and
 gathers by cause what is not shown; `invariants` shows that invariants hold at first and that assumptions can hold
 together, also those of tables that run in one cycle; `meetings` that lines which are said to do the same do.
 """

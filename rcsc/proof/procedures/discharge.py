@@ -1,7 +1,8 @@
 """Obligations put to Z3: one question where all hold, else halves until those that fail are found.
 
 In: obligations and what may be assumed. Out: those that can fail, each with its least witness, and those left
-open. Domains of the variables are asserted here. Z3 is loaded only when something is asked.
+open; gathered by cause, a diagnostic a place and kind. Domains of the variables are asserted here. Z3 is loaded only when something is
+asked.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,13 +11,15 @@ from enum import Enum, auto
 from itertools import combinations
 from typing import TypeVar
 
-from rcsc.lang.model import Kind, Real, Value, Variable, VariableName, value_of_key
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
+from rcsc.base.diagnostics.source import Span
+from rcsc.lang.model import Real, Value, Variable, spell
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import halved
 from rcsc.proof.solvers.smt import Answer, Solver, Term
 from rcsc.proof.symbolic import trial, values
-from rcsc.proof.symbolic.encode import Frame, least_witness
 from rcsc.proof.symbolic.evaluation import Obligation
 from rcsc.proof.symbolic.remembered import answered
 from rcsc.proof.symbolic.values import Node
@@ -238,17 +241,69 @@ class _Question:
         self.failures.append((at, Discharge.FAILS, witness))
 
     def _witness(self, bad: Node, tried: trial.Point | None) -> tuple[tuple[Variable, Value], ...]:
-        shown = [
-            Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
-            for node in self.variables
-        ]
-        point = self._least(bad, shown) if tried is None else tried
-        return () if point is None else tuple((variable, point[variable.name]) for variable in shown)
+        point = self._least(bad) if tried is None else tried
+        if point is None:
+            return ()
+        return tuple((values.shown(node), point[node.name]) for node in self.variables)
 
-    def _least(self, bad: Node, shown: list[Variable]) -> dict[str, Value] | None:
+    def _least(self, bad: Node) -> dict[str, Value] | None:
         solver = self._fresh()
         solver.add(values.term_of(bad))
-        frame = Frame({node.name: values.term_of(node) for node in self.variables})
-        least = least_witness(solver, shown, frame)
+        least = values.least(solver, self.variables)
         self.asker.tally.queries += solver.queries
         return least
+
+
+# --- told by cause ---
+
+MOST_WITNESSES = 3
+
+_PATIENCE = ("give each query more steps with `--steps`, or narrow the declared ranges",)
+_HELP: dict[Code, tuple[str, ...]] = {
+    Code.OVERFLOW: ("narrow the declared ranges, or guard the operation with `if`",),
+    Code.DIVISION_BY_ZERO: ("guard the division with `if`, or exclude zero from the divisor's range",),
+    Code.INDEX: ("guard the access with `if`, or narrow the index's range",),
+    Code.ASSIGNED_RANGE: (
+        "guard the assignment with `if`, use `min` or `max`, or widen the variable's range",
+    ),
+    Code.USE_BEFORE_ASSIGNMENT: ("give the local a first value where it is declared",),
+    Code.TWO_WRITERS: (
+        "let one action of the line write it: a procedure that does both in the order that is meant",
+    ),
+    Code.ASSUMPTION_NOT_PROVED: ("declare it `assumed` or `monitored`",),
+    Code.INVARIANT_BROKEN: ("mend what runs there, or strengthen the invariant if that state cannot occur",),
+}
+
+
+@dataclass(slots=True)
+class Cause:
+    """One place and what can go wrong there, in every context where it can; told `there` where that is another place."""
+
+    failures: list[Failure] = field(default_factory=list)
+    where: list[tuple[str, str]] = field(default_factory=list)  # note, table
+    there: Span | None = None
+
+
+def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
+    """One cause as it is reported."""
+    span = cause.there or span
+    failing = [
+        (failure, place)
+        for failure, place in zip(cause.failures, cause.where, strict=True)
+        if failure.outcome is Discharge.FAILS
+    ]
+    if not failing:
+        undecided = f"could not be decided whether this holds: {message}"
+        return Diagnostic(Code.UNDECIDED, undecided, Label(span), help=_PATIENCE)
+    columns = tuple(
+        WitnessColumn(
+            table,
+            tuple(variable.name for variable, _ in failure.witness),
+            tuple(spell(variable.type, value) for variable, value in failure.witness),
+        )
+        for failure, (_, table) in failing[:MOST_WITNESSES]
+        if failure.witness
+    )
+    notes = tuple(dict.fromkeys(where for _, (where, _) in failing if where))[:MOST_WITNESSES]
+    more = max(0, len(failing) - MOST_WITNESSES)
+    return Diagnostic(code, message, Label(span), (), notes, _HELP.get(code, ()), columns, more)

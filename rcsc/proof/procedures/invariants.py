@@ -9,8 +9,7 @@ from itertools import combinations, product
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
-from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interpret import initial
+from rcsc.lang.interpret import fold, initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Assumption,

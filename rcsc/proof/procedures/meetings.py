@@ -5,7 +5,7 @@ the table's assumptions. The effects of two lines are compared as values (`relat
 differ such an input is shown, the least that a few steps find, with what each line leaves there.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.base.diagnostics.codes import Code
@@ -97,7 +97,9 @@ def _apart(
         Label(meeting.span),
         related=tuple(Label(line.cell_span(-1), "this line") for line in (first, second)),
         notes=(*(_results(program, meeting, shown) if shown is not None else ()), str(effects)),
-        witnesses=() if shown is None else (_column(program, table, (first, second), shown),),
+        witnesses=()
+        if shown is None
+        else (witness_column(program, table, shown.witness, (first, second), added=False),),
         effects=effects,
     )
 
@@ -109,23 +111,25 @@ def _results(program: Program, meeting: Meeting, shown: Disagreement) -> Iterato
         yield f"`{name}` is then {spell(kind, one)} by `{meeting.first}`, {spell(kind, other)} by `{meeting.second}`"
 
 
-def _column(program: Program, table: Table, lines: Collection[Line], shown: Disagreement) -> WitnessColumn:
+def witness_column(
+    program: Program, table: Table, witness: Mapping[str, Value], lines: Iterable[Line], *, added: bool
+) -> WitnessColumn:
+    """An input as a column of the table, with what lines say of each variable; `added`: with what `above` and `same` add to them."""
     kinds = program.kinds
-    names = tuple(name for name in kinds if name in shown.witness)
+    names = tuple(name for name in kinds if name in witness)
     matched = tuple(
-        MatchedLine(str(line.name), tuple(_cells(table, line, name) for name in names), line.span)
+        MatchedLine(str(line.name), tuple(_cells(table, line, name, added) for name in names), line.span)
         for line in lines
     )
-    values = tuple(spell(kinds[name], shown.witness[name]) for name in names)
-    return WitnessColumn(str(table.name), names, values, matched)
+    return WitnessColumn(
+        str(table.name), names, tuple(spell(kinds[name], witness[name]) for name in names), matched
+    )
 
 
-def _cells(table: Table, line: Line, name: str) -> str:
-    """Return a line's cells for a variable, as written; a test of several variables stands with the first."""
+def _cells(table: Table, line: Line, name: str, added: bool) -> str:
+    """What a line says of a variable, as it is written; a test of several variables stands with the first."""
     return "; ".join(
-        test.text
-        if name in (column.heading, column.variable) or column.subject is None
-        else f"{column.heading} {test.text}"
+        test.text if column.variable == name or column.subject is None else f"{column.heading} {test.text}"
         for test, column in zip(line.tests, table.columns, strict=True)
-        if test is not None and column.written and test.variables[:1] == (name,)
+        if test is not None and (column.written or added) and test.variables[:1] == (name,)
     )

@@ -21,9 +21,9 @@ from typing import TypeAlias
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.folding import fold
 from rcsc.lang.expressions.intervals import may_be_undefined
-from rcsc.lang.leaves import everything, read_by
+from rcsc.lang.interpret import fold
+from rcsc.lang.leaves import called_by, closure, read_by
 from rcsc.lang.model import (
     NOWHERE,
     Action,
@@ -45,8 +45,7 @@ from rcsc.lang.model import (
     ToLeaf,
     pending,
 )
-from rcsc.proof.procedures.causes import MOST_WITNESSES, Cause, diagnostic
-from rcsc.proof.procedures.discharge import Asker, Failure, Tally, fewest
+from rcsc.proof.procedures.discharge import MOST_WITNESSES, Asker, Cause, Failure, Tally, diagnostic, fewest
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Budget
@@ -59,8 +58,7 @@ from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 def called_by_lines(program: Program) -> set[str]:
     """Procedures that some line of some table calls itself."""
     lines = [line for table in program.tables for line in table.every_line]
-    actions = [action.statement for line in lines for action in line.actions]
-    return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
+    return set(called_by(action.statement for line in lines for action in line.actions))
 
 
 def defined_alone(program: Program, table: Table) -> bool:
@@ -311,7 +309,7 @@ class Obligations:
         """Discharge the procedures that no line and no level runs, for all values of their parameters."""
         levels = self.program.levels
         outside = {str(name) for level in levels for name in (*level.preprocess, *level.postprocess)}
-        inside = self._closure(called_by_lines(self.program) | outside)
+        inside = closure(called_by_lines(self.program) | outside, self._procedures)
         for procedure in self.program.procedures:
             run = self._alone(procedure)
             self._clean[procedure.name] = run is not None and not run.obligations
@@ -321,16 +319,6 @@ class Obligations:
                 else:
                     with self._budget():
                         self._settle(run, list, "", "")
-
-    def _closure(self, called: set[str]) -> set[str]:
-        """Return the procedures that run when these do."""
-        waiting, seen = list(called), set(called)
-        while waiting:
-            for statement in everything(self._procedures[waiting.pop()].body):
-                if isinstance(statement, Call) and statement.procedure not in seen:
-                    seen.add(statement.procedure)
-                    waiting.append(statement.procedure)
-        return seen
 
     def _alone(self, procedure: Procedure) -> Run | None:
         """Run the procedure for all values of its parameters; None where it runs too long to follow."""

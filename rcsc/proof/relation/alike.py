@@ -22,7 +22,6 @@ from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
 from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import trial, values
-from rcsc.proof.symbolic.encode import Frame, least_witness
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.remembered import answered
@@ -176,12 +175,10 @@ class _Comparison:
         nodes = [*self.here, wanted]
         free = values.variables(nodes)
         kinds = self.program.kinds
-        shown = [variable for variable in self.program.variables if str(variable.name) in free]
+        shown = [free[name] for name in kinds if name in free]
         solver = stated(nodes, options)
-        frame = Frame({name: values.term_of(node) for name, node in free.items()})
-        witness = least_witness(
-            solver, shown, frame, smt.Budget(WRONG_STEPS), trial.met(self.here, [wanted], near).get(wanted)
-        )
+        known = trial.met(self.here, [wanted], near).get(wanted)
+        witness = values.least(solver, shown, smt.Budget(WRONG_STEPS), known)
         if witness is None or solver.check() is not Answer.SATISFIABLE:
             return None
         results = []
@@ -206,5 +203,4 @@ def _point(nodes: list[Node], options: Options) -> Mapping[str, Value] | Answer:
     answer = solver.check()
     if answer is not Answer.SATISFIABLE:
         return answer
-    free = values.variables(nodes)
-    return {name: solver.value(values.term_of(node), node.kind) for name, node in free.items()}
+    return values.model(solver, values.variables(nodes).values())

@@ -13,14 +13,13 @@ from typing import TypeAlias
 
 from rcsc.lang.hidden import hidden, matched
 from rcsc.lang.meaning import relying
-from rcsc.lang.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
+from rcsc.lang.model import Action, Program, Table, Value, Variable, VariableName
 from rcsc.proof.relation.effect import Effect, Meaning, Shared, differences, several
 from rcsc.proof.relation.questions import stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.encode import Frame, least_witness
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.values import TRUE, Node
 
@@ -174,16 +173,12 @@ class _Question:
         variables = values.variables([*self.known, wrong])
         order = {v.name: at for at, v in enumerate(self.variables)}
         names = sorted(variables, key=lambda name: (order.get(VariableName(name), len(order)), name))
-        shown = [_shown(name, variables[name].kind) for name in names]
-        frame = Frame({name: values.term_of(node) for name, node in variables.items()})
-        least = None if answer is Answer.UNKNOWN else least_witness(solver, shown, frame)
+        looked_at = [variables[name] for name in names]
+        least = None if answer is Answer.UNKNOWN else values.least(solver, looked_at)
         if least is None:
             return NotDecided(first.name, second.name)
         changed = tuple(
             name for name, node in changes if solver.check(values.term_of(node)) is Answer.SATISFIABLE
         )
-        return Differs(tuple((v, least[v.name]) for v in shown), first.name, second.name, changed)
-
-
-def _shown(name: str, kind: Scalar) -> Variable:
-    return Variable(VariableName(name), Kind.STATE, kind, value_of_key(kind, 0))
+        witness = tuple((values.shown(node), least[node.name]) for node in looked_at)
+        return Differs(witness, first.name, second.name, changed)

@@ -13,7 +13,20 @@ from dataclasses import dataclass
 from functools import partial
 
 from rcsc.lang.meaning import relying
-from rcsc.lang.model import Action, Program, Table, Value, Variable, key_bounds, pending, value_of_key
+from rcsc.lang.model import (
+    Action,
+    Bool,
+    Enum,
+    Int,
+    Program,
+    Scalar,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+    pending,
+    value_of_key,
+)
 from rcsc.proof.relation.effect import Effect, Meaning, Shared, value_after
 from rcsc.proof.relation.questions import needed, possible
 from rcsc.proof.solvers.options import Options
@@ -24,6 +37,12 @@ from rcsc.proof.symbolic.values import Node
 
 MOST_STATES = 64
 """Values of a state variable up to which a graph of them is drawn."""
+
+
+def is_few(kind: Scalar) -> bool:
+    """Whether a variable of the type can hold a state: an enumeration, a boolean or a few integers."""
+    low, high = key_bounds(kind)
+    return isinstance(kind, Enum | Bool | Int) and high - low < MOST_STATES
 
 
 @dataclass(frozen=True, slots=True)

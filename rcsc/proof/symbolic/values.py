@@ -8,12 +8,25 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 
 import math
 import sys
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.lang.expressions import intervals
-from rcsc.lang.model import Bool, Int, Real, Scalar, Single, Value, key_bounds, next_value
+from rcsc.lang.model import (
+    Bool,
+    Int,
+    Kind,
+    Real,
+    Scalar,
+    Single,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    next_value,
+    value_of_key,
+)
 from rcsc.lang.operator_table import (
     Arithmetic,
     Comparison,
@@ -27,8 +40,8 @@ from rcsc.lang.operator_table import (
     truth_function,
 )
 from rcsc.proof.solvers import smt
-from rcsc.proof.solvers.smt import Term
-from rcsc.proof.symbolic.encode import operation, within
+from rcsc.proof.solvers.smt import Solver, Term
+from rcsc.proof.symbolic.encode import Frame, least_witness, operation, within
 
 _GREATEST = int(sys.float_info.max)
 
@@ -309,6 +322,27 @@ def variables(nodes: Iterable[Node]) -> dict[str, Node]:
 def domain(nodes: Iterable[Node]) -> list[Term]:
     """State that each variable is in range."""
     return [within(term_of(node), node.kind) for node in nodes if not isinstance(node.kind, Bool)]
+
+
+def shown(node: Node) -> Variable:
+    """A variable as one that a witness shows."""
+    return Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
+
+
+def least(
+    solver: Solver,
+    nodes: Sequence[Node],
+    spare: smt.Budget | None = None,
+    known: Mapping[str, Value] | None = None,
+) -> dict[str, Value] | None:
+    """The least values of variables, in this order, for which what is asserted holds (`encode.least_witness`)."""
+    frame = Frame({node.name: term_of(node) for node in nodes})
+    return least_witness(solver, map(shown, nodes), frame, spare, known)
+
+
+def model(solver: Solver, nodes: Iterable[Node]) -> dict[str, Value]:
+    """The values of variables in the model of the last satisfiable answer."""
+    return {node.name: solver.value(term_of(node), node.kind) for node in nodes}
 
 
 def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:

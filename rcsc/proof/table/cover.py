@@ -28,6 +28,7 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
+from rcsc.proof.procedures.discharge import Tally
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import furthest, halved
@@ -57,31 +58,30 @@ class Cover:
 
 
 class Space:
-    """Questions about inputs: all values of the variables for which `given` holds.
+    """Questions about inputs: all values of the variables.
 
     Attributes:
         variables: In declared order.
-        queries: How often the solver was asked.
+        tally: Counts how often the solver is asked.
     """
 
-    def __init__(self, variables: Iterable[Node], given: Sequence[Node], options: Options) -> None:
+    def __init__(self, variables: Iterable[Node], options: Options, tally: Tally) -> None:
         self.nodes = {node.name: node for node in variables}
         self.variables = [
             Variable(VariableName(name), Kind.INPUT, node.kind, 0) for name, node in self.nodes.items()
         ]
         self.frame = Frame({name: values.term_of(node) for name, node in self.nodes.items()})
-        self.given = list(given)
         self.options = options
-        self.queries = 0
+        self.tally = tally
         self._plain: Solver | None = None
         self._bounds: dict[tuple[str, int, int], Term] = {}
 
     # --- single questions ---
 
     def solver(self, *nodes: Node) -> Solver:
-        """Return a solver that has asserted the domain, the given conditions, and these nodes."""
+        """A solver that knows the domain, and that these hold."""
         solver = Solver(self.options.limits)
-        solver.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
+        solver.add(*values.domain(self.nodes.values()), *map(values.term_of, nodes))
         return solver
 
     def possible(self, *nodes: Node) -> bool:
@@ -102,7 +102,7 @@ class Space:
         Raises:
             UndecidedError: The solver gave up.
         """
-        self.queries += 1
+        self.tally.queries += 1
         return solver.possible(*terms)
 
     def witness(self, *nodes: Node) -> dict[str, Value]:
@@ -117,7 +117,7 @@ class Space:
         """Return the least input, or any input once `spare` is spent."""
         before = solver.queries
         least = least_witness(solver, self.variables, self.frame, spare)
-        self.queries += solver.queries - before
+        self.tally.queries += solver.queries - before
         if least is None:
             raise UndecidedError
         return least
@@ -206,7 +206,7 @@ class Space:
             if smt.gives_up("how wide a region is"):
                 raise UndecidedError
             with smt.within(spare):
-                self.queries += 1
+                self.tally.queries += 1
                 return bad.check(*self._inside(trial_)) is Answer.UNSATISFIABLE
 
         def fills(names: Sequence[str]) -> bool:

@@ -11,7 +11,6 @@ from rcsc.base.diagnostics.diagnostic import (
     Diagnostic,
     Effects,
     Label,
-    MatchedLine,
     Place,
     Proposal,
     Severity,
@@ -27,15 +26,14 @@ from rcsc.lang.model import (
     Scalar,
     Table,
     key_bounds,
-    spell,
 )
+from rcsc.proof.procedures.meetings import witness_column
 from rcsc.proof.relation.alike import alike
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
 from rcsc.proof.table import cells as words
 from rcsc.proof.table.certificate import must_cover
-from rcsc.proof.table.findings.groups import grouped, names_of
-from rcsc.proof.table.findings.likely import likely
+from rcsc.proof.table.findings.told import grouped, likely, names_of
 from rcsc.proof.table.regions import partition
 from rcsc.proof.table.repair import NewLine, PartingCell, Partings, changes_of, left_by, new_line
 from rcsc.proof.table.verdict import (
@@ -435,26 +433,8 @@ def _share(count: int, total: int) -> str:
 def _column(
     program: Program, table: Table, witness: Witness, lines: tuple[int, ...], region: Region | None
 ) -> WitnessColumn:
-    kinds: dict[str, Scalar] = program.kinds
-    names = tuple(name for name in kinds if name in witness)
-    matched = tuple(
-        MatchedLine(
-            table.lines[at].name, tuple(_cells(table, at, name) for name in names), table.lines[at].span
-        )
-        for at in lines
+    matched = tuple(table.lines[at] for at in lines)
+    return replace(
+        witness_column(program, table, witness, matched, added=True),
+        region=words.region(program.kinds, region),
     )
-    values = tuple(spell(kinds[name], witness[name]) for name in names)
-    return WitnessColumn(table.name, names, values, matched, words.region(kinds, region))
-
-
-def _cells(table: Table, line: int, name: str) -> str:
-    """Return a line's tests of a variable; one of several variables stands with the first."""
-    texts = []
-    for test, column in zip(table.lines[line].tests, table.columns, strict=True):
-        if test is not None and test.variables and test.variables[0] == name:
-            texts.append(
-                test.text
-                if column.variable == name or column.subject is None
-                else f"{column.heading} {test.text}"
-            )
-    return "; ".join(texts)

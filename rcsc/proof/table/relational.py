@@ -13,8 +13,7 @@ from functools import cached_property, partial
 from itertools import combinations, islice
 from random import Random
 
-from rcsc.lang.expressions.folding import fold
-from rcsc.lang.interpret import UNDEFINED
+from rcsc.lang.interpret import UNDEFINED, fold
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     AssumptionName,

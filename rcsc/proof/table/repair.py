@@ -12,7 +12,7 @@ from math import gcd
 
 from rcsc.base.diagnostics.diagnostic import Change, Place
 from rcsc.lang.expressions.conditions import box_of
-from rcsc.lang.expressions.folding import fold
+from rcsc.lang.interpret import fold
 from rcsc.lang.interval_sets import complement, holds, joined, meet, size
 from rcsc.lang.leaves import is_finite
 from rcsc.lang.model import (

@@ -13,23 +13,19 @@ from rcsc.lang.leaves import may_write
 from rcsc.lang.model import (
     Action,
     Assign,
-    Bool,
     Default,
     Enum,
-    Int,
     Kind,
     Line,
     Program,
     Table,
     Value,
     Variable,
-    key_bounds,
     spell,
 )
-from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
-from rcsc.proof.relation.steps import MOST_STATES, Step, Steps
+from rcsc.proof.relation.steps import Step, Steps, is_few
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.views.graph import labels
@@ -65,11 +61,7 @@ def derive(
     chosen = _state(program, table, state)
     if isinstance(chosen, Diagnostic):
         return chosen
-    written = next(
-        expanded(declaration, table, apart=True)
-        for declaration in file.declarations
-        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
-    )
+    written = labels.written_of(file, table)
     try:
         with smt.together(options.drawn):
             return _Derivation(
@@ -89,7 +81,7 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
         and not v.name.endswith(".next")
         and v.previous_of is None
         and v.counts is None
-        and _few(v)
+        and is_few(v.type)
     ]
     if wanted:
         candidates = [v for v in fit if v.name == wanted]
@@ -119,11 +111,6 @@ def _moved(program: Program, table: Table, candidates: list[Variable]) -> list[V
     statements = [action.statement for line in table.every_line for action in line.actions]
     written = may_write(statements, procedures)
     return [v for v in candidates if v.name in written or f"{v.name}.next" in written]
-
-
-def _few(variable: Variable) -> bool:
-    low, high = key_bounds(variable.type)
-    return isinstance(variable.type, Enum | Bool | Int) and high - low < MOST_STATES
 
 
 @dataclass(slots=True)
@@ -188,12 +175,11 @@ class _Derivation:
         return f"{' | '.join(left)} || {' | '.join(right)}".strip()
 
     def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
-        """Return the conditions in the line's cells, without the state's; only those of `columns`, where these are given."""
-        cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
+        """What the line's cells say, the state's left out; of these columns only where they are given."""
         return [
-            tree.term(heading, cell)
-            for column, (heading, cell) in enumerate(cells)
-            if cell is not None and not self._is_state(heading) and (columns is None or column in columns)
+            term
+            for column, term in labels.said_by(self.written, self._row(at)).items()
+            if not self._is_state(self.written.conditions[column]) and (columns is None or column in columns)
         ]
 
     # --- edges ---
@@ -274,9 +260,8 @@ class _Derivation:
     # --- what is shown ---
 
     def _common(self, edges: list[Edge]) -> list[tree.Expr]:
-        """Return the terms shared by every edge that leaves a single state."""
-        own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
-        return [term for term in own[0] if all(term in terms for terms in own)] if len(own) > 1 else []
+        """The terms shared by every edge that leaves a single state."""
+        return labels.common([labels.terms_of(edge.guard) for edge in edges if edge.source != ANY])
 
     def _eased(self, edge: Edge, common: list[tree.Expr], values: Mapping[str, Value]) -> Edge:
         if edge.default:

@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from rcsc.base.diagnostics.source import Source
+from rcsc.lang.model import Table
 from rcsc.lang.operator_table import NEGATION
+from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import ACTION_WORDS
@@ -33,6 +35,26 @@ class WordsError(Exception):
 
 
 # --- guards ------------------------------------------------------------------------------
+
+
+def written_of(file: tree.File, table: Table) -> tree.TableDecl:
+    """The table as the file declares it, with what `above` and `same` add, each in cells of its own."""
+    return next(
+        expanded(declaration, table, apart=True)
+        for declaration in file.declarations
+        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
+    )
+
+
+def said_by(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
+    """What the condition cells of a line say, each with its heading, by column."""
+    cells = enumerate(zip(written.conditions, row.conditions, strict=True))
+    return {at: tree.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
+
+
+def common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
+    """The terms that all of several edges share."""
+    return [term for term in every[0] if all(term in terms for terms in every)] if len(every) > 1 else []
 
 
 def guard(terms: list[tree.Expr]) -> str:

@@ -8,7 +8,6 @@ others is drawn once, from every line, with the lines that it cannot follow.
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.lang.model import Program, Table
-from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.proof.relation.follow import Follow, following
 from rcsc.proof.solvers import smt
@@ -30,21 +29,15 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
     except UndecidedError:
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
-    written = next(
-        expanded(declaration, table, apart=True)
-        for declaration in file.declarations
-        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
-    )
-    names = [row.name for row in written.rows if not row.default] + [
-        row.name for row in written.rows if row.default
-    ]
-    rows = {row.name: row for row in written.rows}
-    terms = [_terms(written, rows[name]) for name in names]
+    written = labels.written_of(file, table)
+    rows = sorted(written.rows, key=lambda row: row.default)
+    names = [row.name for row in rows]
+    terms = [labels.said_by(written, row) for row in rows]
     live = sorted({follow.line for follow in follows})
     edges: list[Edge] = []
     many = [at for at in live if sum(follow.then == at for follow in follows) > _MOST * len(live)]
     own = [follow for follow in follows if follow.then not in many]
-    common = _common([list(terms[follow.then].values()) for follow in own])
+    common = labels.common([list(terms[follow.then].values()) for follow in own])
     for at in live:
         before = [follow for follow in follows if follow.then == at]
         if at in many:
@@ -55,15 +48,6 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
         table.name, LINES, tuple(edges), lines=tuple(names), states=tuple(names[at] for at in live)
     )
     return Derived(graph, labels.guard(common))
-
-
-def _terms(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
-    cells = enumerate(zip(written.conditions, row.conditions, strict=True))
-    return {at: tree.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
-
-
-def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
-    return [term for term in every[0] if all(term in terms for terms in every)] if len(every) > 1 else []
 
 
 def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common: list[tree.Expr]) -> Edge:

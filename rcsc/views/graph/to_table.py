@@ -18,7 +18,7 @@ from rcsc.lang.syntax.rows import ACTION_WORDS
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
 from rcsc.views.graph import labels
 from rcsc.views.graph.formats.reading import UnreadableError
-from rcsc.views.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
+from rcsc.views.graph.formats.state_graph import ANY, LINES, Edge, StateGraph, free
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*$")
 _WHEN = "when"
@@ -115,10 +115,10 @@ def _named(lines: list[_Line], graph: StateGraph, notes: list[str]) -> list[_Lin
         twins = [at for at, other in enumerate(lines) if other.name == line.name]
         name = line.name
         if not name:
-            name = _free(str(number + 1), taken)
+            name = free(str(number + 1), taken)
             notes.append(f"an edge from `{line.edge.source}` has no line: it is line `{name}` now")
         elif len(twins) > 1:
-            name = _free(f"{name}{_letter(twins.index(number))}", taken)
+            name = free(f"{name}{_letter(twins.index(number))}", taken)
             notes.append(f"the edges of line `{line.name}` do not say one thing: there is a line `{name}`")
         taken.add(name)
         named.append(_Line(name, line.edge, line.sources, line.target))
@@ -133,12 +133,6 @@ def _named(lines: list[_Line], graph: StateGraph, notes: list[str]) -> list[_Lin
 
 def _letter(number: int) -> str:
     return chr(ord("a") + number) if number < 26 else f"_{number}"
-
-
-def _free(name: str, taken: set[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 # --- columns -----------------------------------------------------------------------------

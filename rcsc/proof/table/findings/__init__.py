@@ -11,6 +11,6 @@ something. PackML's published table has three groups of such overlaps for its 20
 Trusted: nothing. Both choose among true findings; each is in the JSON form, with a witness that the interpreter can run.
 Cost: a question to Z3 a finding that is shown, and only where the program declares facts that the table does not assume.
 
-Modules: `likely` (which witness), `groups` (what is told together), `unread` (what is declared and nobody reads, or may not
+Modules: `told` (which witness is shown, and what is told together), `unread` (what is declared and nobody reads, or may not
 mean what was meant).
 """

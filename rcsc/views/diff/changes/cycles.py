@@ -20,15 +20,13 @@ from rcsc.lang.model import (
     Line,
     ProcedureName,
     Program,
-    Scalar,
     Statement,
     Table,
-    key_bounds,
     pending,
 )
 from rcsc.proof.relation.follow import following
 from rcsc.proof.relation.questions import stated
-from rcsc.proof.relation.steps import MOST_STATES, pair_is, reached
+from rcsc.proof.relation.steps import is_few, pair_is, reached
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.proof.symbolic import values
@@ -101,13 +99,10 @@ def _states(versions: Versions) -> list[str]:
         for p in (versions.before, versions.after)
     ]
     return [
-        name for name in versions.leaves if all(name in side for side in both) and _few(versions.kinds[name])
+        name
+        for name in versions.leaves
+        if all(name in side for side in both) and is_few(versions.kinds[name])
     ]
-
-
-def _few(kind: Scalar) -> bool:
-    low, high = key_bounds(kind)
-    return high - low < MOST_STATES
 
 
 def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[tuple[GraphStep, Node]]:

@@ -104,13 +104,13 @@ def _effects(
     versions: Versions, what: str, name: str, pair: tuple[Effect, Effect], runners: tuple[Runner, Runner]
 ) -> ComparedPart:
     """Where two effects differ, all inputs free."""
-    before = versions.queries
+    before = versions.tally.queries
     old, new = (Doing(effect, run, {}) for effect, run in zip(pair, runners, strict=True))
     contrasted = contrast(versions, TRUE, (old, new))
     changed = (
         changes(versions, PartSort.EFFECT, (name, name), TRUE, TRUE, contrasted) if contrasted.differ else []
     )
-    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.queries - before)
+    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.tally.queries - before)
 
 
 # --- levels ----------------------------------------------------------------------------------
@@ -346,7 +346,7 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
     if apart := sorted(versions.aligned.apart & read):
         return ComparedPart(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
-    before = versions.queries
+    before = versions.tally.queries
     old, new = (
         _worth(meaning, condition, undefined="false" if what == "property" else "undefined")
         for meaning, condition in zip(versions.meanings(), pair, strict=True)
@@ -356,7 +356,7 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
         if first != second:
             region = versions.shared.canonical(values.both(old[first], new[second]))
             changed += changes(versions, PartSort.CONDITION, (first, second), region)
-    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.queries - before)
+    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.tally.queries - before)
 
 
 def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:

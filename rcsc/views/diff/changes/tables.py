@@ -81,7 +81,7 @@ class _Comparison:
 
     def part(self) -> ComparedPart:
         """The table as a part: everything that changed."""
-        versions, before = self.versions, self.versions.queries
+        versions, before = self.versions, self.versions.tally.queries
         changed: list[Change] = []
         moved: list[Change] = []
         first, second = (list(outs.values()) for outs in self.outcomes)
@@ -95,7 +95,7 @@ class _Comparison:
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         return ComparedPart(
             "table", str(self.tables[1].name), tuple(_claims(*self.tables)), tuple(changed), tuple(moved), Basis.SOLVER,
-            versions.queries - before, space.volume(space.nodes),
+            versions.tally.queries - before, space.volume(space.nodes),
         )  # fmt: skip
 
     def _bodies_differ(self, before: Outcome, after: Outcome) -> bool:
@@ -123,7 +123,6 @@ class _Comparison:
             )
             pairs.append((before, after))
             solver.add(values.term_of(values.negation(values.both(before.when, after.when))))
-        versions.queries += space.queries
         return pairs
 
     def _compared(self, before: Outcome, after: Outcome) -> list[Change]:

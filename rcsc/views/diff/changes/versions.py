@@ -27,6 +27,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.model import Value as Scalars
+from rcsc.proof.procedures.discharge import Tally
 from rcsc.proof.relation.effect import Effect, Meaning, Shared
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
@@ -89,7 +90,7 @@ class Versions:
         before, after: Aligned.
         leaves: Those that are compared: both have them.
         stated: For a region that two lines have in common, the conditions of the two: what it is where boxes do not end.
-        queries: How often a solver was asked.
+        tally: Counts how often a solver is asked.
         spare: What is left for the boxes of regions.
     """
 
@@ -108,7 +109,7 @@ class Versions:
         for name, word in words.items():
             self.shared.start[name].term = smt.word(name, word)
         self.order = {name: at for at, name in enumerate(self.kinds)}
-        self.queries = 0
+        self.tally = Tally()
         self.spare = smt.Budget(COVER_STEPS)
         self.stated: dict[Node, Node] = {}
         self.seen: dict[str, Node] = {}
@@ -126,7 +127,7 @@ class Versions:
         variables = sorted(
             inputs.values(), key=lambda node: (self.order.get(node.name, len(self.order)), node.name)
         )
-        return Space(variables, (), self.options)
+        return Space(variables, self.options, self.tally)
 
     def possible(self, *nodes: Node) -> bool:
         """Whether the conditions can hold together.
@@ -137,10 +138,7 @@ class Versions:
         whole = self.shared.canonical(values.all_of(nodes))
         if whole.known:
             return bool(whole.low)
-        space = self.space(whole)
-        answer = space.possible(whole)
-        self.queries += space.queries
-        return answer
+        return self.space(whole).possible(whole)
 
     # --- regions ---
 
@@ -189,10 +187,9 @@ class Versions:
     def _solved(self, whole: Node) -> dict[str, Scalars] | None:
         space = self.space(whole)
         solver = space.solver(whole)
-        self.queries += 1
         if not space.answered(solver):
             return None
-        return {str(v.name): solver.value(space.frame.leaves[v.name], v.type) for v in space.variables}
+        return values.model(solver, space.nodes.values())
 
     def _tried(self, easy: Node, whole: Node) -> dict[str, Scalars] | None:
         """An input found by trial: the least one of what is easy, and values of the other variables."""
@@ -231,9 +228,7 @@ class Versions:
 
     def _cover(self, wanted: Node, allowed: Node, most: int) -> tuple[Cover, int | None]:
         space = self.space(wanted, allowed)
-        cover = space.cover(wanted, allowed, most, self.spare)
-        self.queries += space.queries
-        return cover, space.volume(space.nodes)
+        return space.cover(wanted, allowed, most, self.spare), space.volume(space.nodes)
 
     def _words(self, cover: Cover) -> tuple[tuple[str, ...], ...]:
         return tuple(region(self._kinds_of(box), box) for box in cover.boxes)
@@ -258,10 +253,7 @@ class Versions:
         Raises:
             UndecidedError: The solver gave up.
         """
-        space = self.space(wanted)
-        witness = space.witness(wanted)
-        self.queries += space.queries
-        return witness
+        return self.space(wanted).witness(wanted)
 
     def spelled(self, witness: Mapping[str, Scalars]) -> tuple[tuple[str, str], ...]:
         """An input in words."""

@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass, field
 
 from rcsc.views.graph.formats.reading import ReadArrow, UnreadableError, finished
-from rcsc.views.graph.formats.state_graph import ANY, HEADER, Edge, StateGraph, header
+from rcsc.views.graph.formats.state_graph import ANY, HEADER, Edge, StateGraph, free, header
 
 _ANY_NAME = "any state"
 _HEADER = re.compile(r"%%\s*(\w+)\s*:\s*(.*)$")
@@ -23,7 +23,7 @@ _LINE = re.compile(r"(?:\(?(\w+)\)?(?=\s|\[|$))?\s*(DEFAULT(?: unreachable)?(?=\
 def write(graph: StateGraph) -> str:
     """Write the graph as a Mermaid state diagram."""
     lines = ["stateDiagram-v2", *(f"  %% {word}: {text}" for word, text in header(graph).items())]
-    any_id = _free("any_state", graph.states)
+    any_id = free("any_state", graph.states)
     if any(ANY in (edge.source, edge.target) for edge in graph.edges):
         lines.append(f'  state "{_ANY_NAME}" as {any_id}')
     if graph.initial in graph.states:
@@ -32,12 +32,6 @@ def write(graph: StateGraph) -> str:
         source, target = (any_id if end == ANY else end for end in (edge.source, edge.target))
         lines.append(f"  {source} --> {target} : {_text(edge)}")
     return "\n".join([*lines, ""])
-
-
-def _free(name: str, taken: tuple[str, ...]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _text(edge: Edge) -> str:

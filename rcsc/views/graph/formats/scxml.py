@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 
 from rcsc.base.host.files.read import Malformed, xml_of
 from rcsc.views.graph.formats.reading import ReadArrow, UnreadableError, finished
-from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph, header
+from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph, free, header
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -23,8 +23,8 @@ _WORDS = ("line", "does", "decided", "default")
 
 
 def write(graph: StateGraph) -> str:
-    """Write the graph as SCXML."""
-    whole = _free("any", graph.states)
+    """The graph as SCXML."""
+    whole = free("any", graph.states)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>']
     about = "".join(f"\n    rcsc:{word}={quoteattr(text)}" for word, text in header(graph).items())
     lines.append(
@@ -38,12 +38,6 @@ def write(graph: StateGraph) -> str:
         lines += [f"      {_transition(edge)}" for edge in graph.edges if edge.source == state]
         lines.append("    </state>")
     return "\n".join([*lines, "  </state>", "</scxml>", ""])
-
-
-def _free(name: str, taken: tuple[str, ...]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _transition(edge: Edge) -> str:

@@ -3,6 +3,7 @@
 Attributes of an edge are in the table's own words: a guard is an expression, an effect is action cells under their headings.
 """
 
+from collections.abc import Container
 from dataclasses import dataclass
 
 ANY = "*"
@@ -101,3 +102,10 @@ def with_header(attributes: dict[str, str], edges: tuple[Edge, ...], states: tup
         tuple(attributes.get("lines", "").split()),
         states,
     )
+
+
+def free(name: str, taken: Container[str]) -> str:
+    """The name, with as many `_` after it as make it one that is not taken."""
+    while name in taken:
+        name += "_"
+    return name
