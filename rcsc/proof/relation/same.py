@@ -7,7 +7,7 @@ under the assumptions of the first table and the program's invariants; lines are
 look back at by what feeds it (`rcsc.lang.hidden`): of a state that the compiler adds to one of the programs alone nothing is known.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -82,21 +82,29 @@ class Outcome:
     actions: tuple[Action, ...] | None = None
 
 
-def outcomes(meaning: Meaning, table: Table) -> Iterator[Outcome]:
-    """Yield all outcomes of a table: for each input exactly one comes about."""
+def outcomes(
+    meaning: Meaning, table: Table, joined: Callable[[Sequence[Node]], Node] = values.all_of
+) -> Iterator[Outcome]:
+    """Yield all outcomes of a table: for each input exactly one comes about.
+
+    Args:
+        meaning: Of the table's program.
+        table: The table.
+        joined: How conditions are conjoined: what lines say stands first, then what makes one of them the only one.
+    """
     lines = meaning.lines(table)
     undefined, many = values.any_of(meaning.bad), several(lines)
-    fine = values.negation(undefined)
-    alone = values.both(fine, values.negation(many))
+    fine, default = values.negation(undefined), table.default
     for line, holds in zip(table.lines, lines, strict=True):
-        yield Outcome(line.name, values.both(alone, holds), holds, line.actions)
-    nothing, default = values.both(fine, values.negation(values.any_of(lines))), table.default
+        alone = joined((holds, values.negation(many), fine))
+        yield Outcome(line.name, alone, joined((holds,)), line.actions)
+    nothing = joined((values.negation(values.any_of(lines)), fine))
     if default is None:
         yield Outcome(NO_LINE, nothing)
     else:
         yield Outcome(default.name, nothing, TRUE, default.actions)
-    yield Outcome(SEVERAL_LINES, values.both(fine, many))
-    yield Outcome(UNDEFINED, undefined)
+    yield Outcome(SEVERAL_LINES, joined((many, fine)))
+    yield Outcome(UNDEFINED, joined((undefined,)))
 
 
 def compare(first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> Comparison:

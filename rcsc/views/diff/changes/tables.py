@@ -4,8 +4,7 @@ In: two tables over shared leaves. Out: a `ComparedPart`. Inputs at which the ve
 other; when the solver finds no more, that is the proof that nothing else changed.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 from rcsc.lang.interpret import execute, matching_lines
@@ -197,11 +196,11 @@ def assumed(table: Table, meaning: Meaning) -> Node:
 
 def _outcomes(table: Table, meaning: Meaning) -> dict[tuple[bool, str], Outcome]:
     """What can become of an input, in order of the table; equal outcomes of two versions have equal keys."""
-    canonical = meaning.shared.canonical
-    return {
-        (out.actions is None, out.name): replace(out, when=canonical(out.when), holds=canonical(out.holds))
-        for out in outcomes(meaning, table)
-    }
+
+    def joined(parts: Sequence[Node]) -> Node:
+        return meaning.shared.canonical(values.all_of(reversed(parts)))
+
+    return {(out.actions is None, out.name): out for out in outcomes(meaning, table, joined)}
 
 
 def _label(table: Table, out: Outcome) -> str:
