@@ -20,6 +20,6 @@ Trusted: Z3 and the rooms before `table`, or `certify` in their place, for what 
 depend on the machine.
 
 Rooms, in the order in which they may use each other: `solvers` asks Z3, cvc5 and PySAT; `symbolic` makes terms of expressions and
-statements; `procedures` proves what procedures owe; `table` proves exactly-one; `relation` compares lines and tables; `certify` checks
-a certificate anew.
+statements; `relation` says whether two do the same, which line leads where and which follows which; `procedures` proves what procedures
+owe; `table` proves exactly-one; `certify` checks a certificate anew.
 """
