@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from rcsc.base.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.base.diagnostics.diagnostic import Change, ChangeKind, Proposal
 from rcsc.code.testing.inputs.sampling import declarations, snapshot
 from rcsc.compose.counterexample.applied import After, Text, Texts
 from rcsc.compose.proof.system import NoProgramError, transition_systems
@@ -67,7 +67,7 @@ def _rows(text: Text) -> Iterator[tuple[After, PartingCell | Change]]:
     for gap in prove_table(program, text.table, Options(steps=200_000)).findings:
         row = new_line(program, text.table, gap) if isinstance(gap, Gap) else None
         if isinstance(gap, Gap) and row is not None:
-            yield text.joined(row, gap.witnesses[0]), Change(Place.LINE, texts=row.cells)
+            yield text.joined(row, gap.witnesses[0]), Change(ChangeKind.LINE, texts=row.cells)
 
 
 def _matched_as_told(text: Text, what: PartingCell | Change, rng: Rng) -> bool:

@@ -31,8 +31,8 @@ from rcsc.compose.proof.standing import (
     ONE_LINE,
     PROPERTY,
     SOME_LINE,
-    Known,
     KnownSystem,
+    KnownVerdict,
     LevelOutline,
 )
 from rcsc.driver.outline import known
@@ -70,7 +70,7 @@ class _Place:
     table: str
     default: str
 
-    def known(self, assumption: str) -> Known:
+    def known(self, assumption: str) -> KnownVerdict:
         """Return the verdict on one of the table's assumptions here."""
         return self.standing.of_obligation(self.level.name, (ASSUMPTION, self.table, assumption))
 
@@ -132,15 +132,17 @@ class _Seen:
         for place in at:
             self.levels.setdefault((system, place.level.name), (place.standing, place.level))
         states = {name: _worst({place.known(name) for place in at}) for name in _open(table)}
-        by = {known: tuple(name for name, state in states.items() if state is known) for known in Known}
-        proved, conditional = by[Known.PROVED], by[Known.CONDITIONAL]
+        by = {
+            known: tuple(name for name, state in states.items() if state is known) for known in KnownVerdict
+        }
+        proved, conditional = by[KnownVerdict.PROVED], by[KnownVerdict.CONDITIONAL]
         unreached = tuple(line for line in at[0].unreached if all(line in place.unreached for place in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
         known_system = at[0].standing
-        self._say(system, known_system, wanted=bool(by[Known.UNKNOWN]) and not known_system.broken)
+        self._say(system, known_system, wanted=bool(by[KnownVerdict.UNKNOWN]) and not known_system.broken)
         assumptions = tuple(
-            (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
+            (name, KnownVerdict.PROVED.value if name in proved else was) for name, was in table.assumptions
         )
         rests = tuple(
             dict.fromkeys(word for place in at for name in conditional for word in place.rests(name))
@@ -149,15 +151,17 @@ class _Seen:
         trusts = tuple(
             dict.fromkeys(word for place in at for claim in claims for word in place.trusts(*claim))
         )
-        together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
+        together = InSystem(
+            system, proved, by[KnownVerdict.NOT_PROVED], unreached, conditional, rests, trusts
+        )
         return replace(table, assumptions=assumptions, together=together)
 
     def _say(self, system: str, known_system: KnownSystem | None, *, wanted: bool) -> None:
         before = self.systems.get(system)
         wanted = wanted or (before is not None and before.wanted)
-        whole = Known.UNKNOWN if known_system is None else known_system.whole
+        whole = KnownVerdict.UNKNOWN if known_system is None else known_system.whole
         missing: tuple[str, ...] = ()
-        if known_system is not None and whole in {Known.PARTLY, Known.CONDITIONAL}:
+        if known_system is not None and whole in {KnownVerdict.PARTLY, KnownVerdict.CONDITIONAL}:
             levels = [level.name for level in known_system.outline.levels]
             missing = tuple(f"level `{name}`: {why}" for name in levels for why in known_system.missing(name))
         self.systems[system] = SystemReport(system, whole.value, wanted, missing)
@@ -191,7 +195,7 @@ class _Seen:
             for (system, _), (known_system, level) in self.levels.items()
             if any((outline.file, outline.name) == (file, table) for outline in level.tables)
         ]
-        if _worst({state for *_, state in places_}) not in {Known.PROVED, Known.TRUSTED}:
+        if _worst({state for *_, state in places_}) not in {KnownVerdict.PROVED, KnownVerdict.TRUSTED}:
             return diagnostic
         systems = ", ".join(dict.fromkeys(system for system, *_ in places_))
         note = f"none comes in {systems}: proved of the levels together; what this file says does not show it"
@@ -213,12 +217,12 @@ class _Seen:
         ]
         state = _worst({known_system.of_obligation(level, key) for _, known_system, level, key in stated})
         systems = ", ".join(dict.fromkeys(system for system, *_ in stated))
-        if state is Known.PROVED:
+        if state is KnownVerdict.PROVED:
             words = dict.fromkeys(
                 word for _, known_system, level, key in stated for word in known_system.trusting(level, key)
             )
             note = f"proved of the levels together, {systems}{trusting(words)}"
-        elif state is Known.CONDITIONAL:
+        elif state is KnownVerdict.CONDITIONAL:
             words = dict.fromkeys(
                 word for _, known_system, level, key in stated for word in known_system.lacking(level, key)
             )
@@ -230,7 +234,7 @@ class _Seen:
     def warnings(self) -> Iterator[Diagnostic]:
         """Yield a warning for each level, of those that run the tables, that is not proved, or relies on a promise that is not."""
         for (system, _), (known_system, level) in self.levels.items():
-            if known_system.of_level(level.name) is Known.NOT_PROVED:
+            if known_system.of_level(level.name) is KnownVerdict.NOT_PROVED:
                 yield self._not_proved(system, known_system, level)
             for promise in known_system.broken:
                 if promise.level == level.name:
@@ -287,10 +291,16 @@ def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:
                 yield _Place(known_system, level, outline.name, outline.default)
 
 
-def _worst(states: Collection[Known]) -> Known:
+def _worst(states: Collection[KnownVerdict]) -> KnownVerdict:
     """Return the worst state among several levels; unknown where none knows anything."""
-    order = (Known.NOT_PROVED, Known.UNKNOWN, Known.CONDITIONAL, Known.TRUSTED, Known.PROVED)
-    return next((state for state in order if state in states), Known.UNKNOWN)
+    order = (
+        KnownVerdict.NOT_PROVED,
+        KnownVerdict.UNKNOWN,
+        KnownVerdict.CONDITIONAL,
+        KnownVerdict.TRUSTED,
+        KnownVerdict.PROVED,
+    )
+    return next((state for state in order if state in states), KnownVerdict.UNKNOWN)
 
 
 def _open(table: TableReport) -> list[str]:

@@ -10,7 +10,7 @@ from rcsc.base.diagnostics import report
 from rcsc.base.diagnostics.diagnostic import Severity
 from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract import claims
-from rcsc.compose.proof.standing import Known
+from rcsc.compose.proof.standing import KnownVerdict
 from rcsc.proof.solvers.options import Options
 from tests.support.programs.stages import reported
 
@@ -58,6 +58,6 @@ def test_the_manual_says_what_every_verdict_means() -> None:
     page = (REPO / "grammar" / "manual.md").read_text(encoding="utf-8")
     section = page.partition("## What a verdict says\n")[2].partition("\n## ")[0]
     meant = {word for row in section.splitlines() for word in re.findall(r"\*([^*]+)\*", row.split(" | ")[0])}
-    printed = {one.value for kind in (claims.Verdict, Known, report.Verdict) for one in kind}
+    printed = {one.value for kind in (claims.Verdict, KnownVerdict, report.Verdict) for one in kind}
     assert printed <= meant
     assert {"rests on", "proved, trusting"} <= meant

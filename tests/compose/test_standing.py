@@ -13,7 +13,7 @@ import pytest
 
 from rcsc.base.host.cache import FOLDER, Cache
 from rcsc.base.host.files.plain import plain, read
-from rcsc.compose.proof.standing import Known, KnownSystem, SystemOutline, standing
+from rcsc.compose.proof.standing import KnownSystem, KnownVerdict, SystemOutline, standing
 from rcsc.driver import outline
 from rcsc.front.commands import run
 from rcsc.lang.interpret import initial, run_table
@@ -422,7 +422,7 @@ def test_an_outline_comes_back_as_it_was(here: Path) -> None:
     found = outline._read(here / "system.toml")
     assert found is not None
     made = outline.outline(found[0])
-    assert standing_of(made).of_level("upper") is Known.UNKNOWN
+    assert standing_of(made).of_level("upper") is KnownVerdict.UNKNOWN
     assert read(SystemOutline, json.loads(json.dumps(plain(made)))) == made
     assert [one.name for one in made.levels] == ["upper", "lower"]
     assert {level for promise in made.assumed for level, _ in promise.needs} == {"upper", "lower"}

@@ -23,7 +23,7 @@ from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bou
 from rcsc.lang.resolve import compile_text
 from rcsc.proof.certify import CaseAnswer, certify, check_certificate
 from rcsc.proof.certify.execution import Run, Start
-from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.settle import script, values_in
 from rcsc.proof.certify.table import TableChecker
 from rcsc.proof.certify.values import INT, Term, Terms, parts_first, spanned
@@ -603,7 +603,7 @@ def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
     run = Run(start, "p")
     term = run.evaluate(expression(program))
     owed = start.terms.every(start.terms.follows(debt.path, debt.good) for debt in run.owed)
-    span = Known((), ()).span(term)
+    span = KnownSpans((), ()).span(term)
     asked = 0
     for point in points(program):
         cases = {
@@ -653,7 +653,7 @@ def test_what_a_condition_tells_of_spans_is_so_wherever_it_holds(condition: str)
     program = program_of(f"{WIDE}assume here assumed : {condition}\n")
     start = Start(program)
     known = [start.condition(program.assumptions[0].condition)]
-    spans, everything = Known(known, ()), parts_first(*known)
+    spans, everything = KnownSpans(known, ()), parts_first(*known)
     assert not spans.impossible
     holding = 0
     for point in points(program):
@@ -895,13 +895,13 @@ def with_steps(count: int, step: str) -> Program:
 
 def test_a_long_run_is_followed_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[Term] = []
-    found = Known._span_of
+    found = KnownSpans._span_of
 
-    def counted(known: Known, term: Term) -> Any:
+    def counted(known: KnownSpans, term: Term) -> Any:
         looked.append(term)
         return found(known, term)
 
-    monkeypatch.setattr(Known, "_span_of", counted)
+    monkeypatch.setattr(KnownSpans, "_span_of", counted)
     counts = []
     for count in (50, 100):
         program = with_steps(count, "s := s / 2 + a")

@@ -11,7 +11,7 @@ import pytest
 from rcsc.lang.model import Bool, Int, Program, Real
 from rcsc.proof.certify import certify
 from rcsc.proof.certify.execution import Start
-from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.owed import Debts
 from rcsc.proof.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
 from rcsc.proof.certify.values import (
@@ -327,7 +327,7 @@ FACTS: list[tuple[list[Term], dict[Term, tuple[int, int]]]] = [
 
 @pytest.mark.parametrize(("hypotheses", "spans"), FACTS)
 def test_what_hypotheses_tell_is_exact(hypotheses: list[Term], spans: dict[Term, tuple[int, int]]) -> None:
-    known = Known(hypotheses, ())
+    known = KnownSpans(hypotheses, ())
     assert known.impossible is False
     assert {term: known.span(term) for term in spans} == spans
     assert all(known.span(one) == (1, 1) for one in hypotheses if one.op != "or")
@@ -337,14 +337,14 @@ def test_what_hypotheses_tell_is_exact(hypotheses: list[Term], spans: dict[Term,
 def test_hypotheses_that_contradict_each_other_are_impossible_wherever_they_stand(at: int) -> None:
     hypotheses = [MAKE("<", NUMBER, whole(0)), MAKE("<", whole(3), NUMBER)]
     hypotheses.insert(at, TRUTH)
-    assert Known(hypotheses, ()).impossible is True
-    assert Known([MAKE("<", NUMBER, whole(-3))], ()).impossible is True
+    assert KnownSpans(hypotheses, ()).impossible is True
+    assert KnownSpans([MAKE("<", NUMBER, whole(-3))], ()).impossible is True
 
 
 def test_what_is_kept_lies_in_its_place_once_that_is_shown() -> None:
     kept = TERMS.kept(MAKE("+", DOUBLE, double(1.0)), 0.0, 1.0, 3)
-    assert Known((), ()).span(kept) == (-0.5, 3.0)
-    assert Known((), {3}).span(kept) == (0.0, 1.0)
+    assert KnownSpans((), ()).span(kept) == (-0.5, 3.0)
+    assert KnownSpans((), {3}).span(kept) == (0.0, 1.0)
 
 
 # --- settling -----------------------------------------------------------------------------
@@ -354,7 +354,7 @@ def settled(hypotheses: list[Term], good: Term, ask: CaseAnswer | None = None) -
     """What becomes of an obligation, and the work."""
     asked = None if ask is None else (lambda _: ask)
     settler = Settler(TERMS, asked, {"b": 0, "n": 0, "m": 0, "x": 0.0})
-    return settler.settle(hypotheses, TERMS.true, good, Known(hypotheses, ())), settler.work
+    return settler.settle(hypotheses, TERMS.true, good, KnownSpans(hypotheses, ())), settler.work
 
 
 FAR = MAKE("<=", MAKE("-", MAKE("*", DOUBLE, DOUBLE), DOUBLE), double(3.9))

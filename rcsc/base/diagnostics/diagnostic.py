@@ -34,7 +34,7 @@ class MatchedLine:
     span: Span | None = None
 
 
-class Place(StrEnum):
+class ChangeKind(StrEnum):
     """The part of a table that a change writes."""
 
     CELL = "cell"  # a condition of a line
@@ -54,7 +54,7 @@ class Change:
         texts: Of a cell its text, of a new line the text of each condition, of `same` the other lines.
     """
 
-    place: Place
+    place: ChangeKind
     line: str = ""
     column: int = 0
     texts: tuple[str, ...] = ()

@@ -36,7 +36,7 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class MemberPath:
     """A member of the state, step by step: a piece of its path as it is spelled, or a computed index."""
 
     steps: tuple["str | Code", ...]
@@ -113,7 +113,9 @@ class Round:
     inner: "Code"
 
 
-Code: TypeAlias = Name | Constant | Place | Prefix | Infix | Invoke | Cast | Choice | Element | Items | Round
+Code: TypeAlias = (
+    Name | Constant | MemberPath | Prefix | Infix | Invoke | Cast | Choice | Element | Items | Round
+)
 
 # --- statements ----------------------------------------------------------------------
 
@@ -291,7 +293,7 @@ class Language(ABC):
                 return text
             case Constant():
                 return self.constant(code)
-            case Place(steps=steps):
+            case MemberPath(steps=steps):
                 return self.state + "".join(s if isinstance(s, str) else f"[{self.code(s)}]" for s in steps)
             case Prefix(op=op, operand=operand):
                 return op + self.operand(operand, self.levels.get(f"{op}x", 0))

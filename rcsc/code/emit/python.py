@@ -22,8 +22,8 @@ from rcsc.code.emit.code_tree import (
     Items,
     Leave,
     Line,
+    MemberPath,
     Name,
-    Place,
     Prefix,
     Round,
     Set,
@@ -194,7 +194,7 @@ class _Maker:
 
     def _trace(self, *more: Stmt) -> Body:
         """Return statements that set the trace of a cycle that has run no line."""
-        failed = (Set(Place((word,)), Constant(0)) for word in self.names.failed)
+        failed = (Set(MemberPath((word,)), Constant(0)) for word in self.names.failed)
         return (Set(LINE, Constant(-1)), *more, *failed)
 
     def _admit(self) -> Function:
@@ -213,7 +213,7 @@ class _Maker:
 
     def _check(self) -> Function:
         """Return the function that checks the state, as in C."""
-        body = [when(infix("!=", Place((DIGEST,)), Name("DIGEST")), Leave(Name("FOREIGN")))]
+        body = [when(infix("!=", MemberPath((DIGEST,)), Name("DIGEST")), Leave(Name("FOREIGN")))]
         for at, variable in enumerate(self.program.variables):
             if variable.kind is not model.Kind.INPUT or isinstance(variable.type, Bool):
                 place = self.text.place(variable.name)
@@ -397,7 +397,7 @@ class _Maker:
             assumption = self.program.assumptions[self.plan.monitored[place]]
             word, bit = divmod(place, FAILED_BITS)
             test = Prefix("not ", self.text.expr(assumption.condition))
-            mark = Frame((Place((self.names.failed[word],)), f" |= 1 << {bit}"))
+            mark = Frame((MemberPath((self.names.failed[word],)), f" |= 1 << {bit}"))
             ended = when(FAULTLESS, _faulted(Fault.ASSUMPTION, Constant(place)))
             stop = (ended,) if place in table.stops else ()
             yield Frame(("if ", test, f":  # {comment(assumption.name)}"), (mark, *stop))

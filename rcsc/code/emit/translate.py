@@ -18,8 +18,8 @@ from rcsc.code.emit.code_tree import (
     Invoke,
     Items,
     Loop,
+    MemberPath,
     Name,
-    Place,
     Prefix,
     Round,
     Set,
@@ -32,7 +32,12 @@ from rcsc.lang import model
 from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Single, Statement, Value
 from rcsc.lang.operator_table import Operator
 
-STATE, FAULT, FAULT_AT, LINE = Name("s"), Place(("fault",)), Place(("fault_at",)), Place(("line",))
+STATE, FAULT, FAULT_AT, LINE = (
+    Name("s"),
+    MemberPath(("fault",)),
+    MemberPath(("fault_at",)),
+    MemberPath(("line",)),
+)
 FAULTLESS, FAULTED = infix("==", FAULT, Constant(0)), infix("!=", FAULT, Constant(0))
 
 
@@ -63,7 +68,7 @@ class Text(ABC):
     parameters: Mapping[str, tuple[Scalar, ...]] = field(default_factory=dict)
 
     @abstractmethod
-    def place(self, leaf: str) -> Place:
+    def place(self, leaf: str) -> MemberPath:
         """Return the place of a leaf in the state."""
 
     @abstractmethod
@@ -145,9 +150,9 @@ class PyText(Text):
 
     cases: int = 0
 
-    def place(self, leaf: str) -> Place:
+    def place(self, leaf: str) -> MemberPath:
         """Return the place of a leaf in the state."""
-        return Place((self.names.attributes[leaf],))
+        return MemberPath((self.names.attributes[leaf],))
 
     def function(self, procedure: str) -> str:
         """Return the name of a procedure's function."""

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.base.diagnostics.diagnostic import Change, Place, Proposal
+from rcsc.base.diagnostics.diagnostic import Change, ChangeKind, Proposal
 from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, matching_lines
@@ -138,7 +138,7 @@ class Text:
 
     def joined(self, row: NewLine, seen: Snapshot) -> After:
         """Write a line for a gap's input. Proved means: it alone matches that input, overlaps no other line, and closes what it claims."""
-        made = self._made((Change(Place.LINE, texts=row.cells),))
+        made = self._made((Change(ChangeKind.LINE, texts=row.cells),))
         if not isinstance(made, _Made):
             return After(made)
         new = [name for name in made.names if name not in _names(self.table)]

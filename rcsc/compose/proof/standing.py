@@ -31,7 +31,7 @@ SOME_LINE, ONE_LINE = "some line matches", "no two lines match"
 """Sorts of obligations: a table's assumption, a property."""
 
 
-class Known(StrEnum):
+class KnownVerdict(StrEnum):
     """The state of knowledge about an obligation, a level, or the whole system."""
 
     PROVED = "proved"
@@ -167,35 +167,45 @@ class KnownSystem:
     @property
     def broken(self) -> tuple[Promise, ...]:
         """The promises that are not proved of the neighbour, although its proof is kept."""
-        return tuple(promise for promise in self.outline.assumed if self._kept(promise) is Known.NOT_PROVED)
+        return tuple(
+            promise for promise in self.outline.assumed if self._kept(promise) is KnownVerdict.NOT_PROVED
+        )
 
-    def _kept(self, assumed: Promise) -> Known:
+    def _kept(self, assumed: Promise) -> KnownVerdict:
         known = [self._obligation(level, key) for level, key in assumed.needs]
-        if not assumed.begins or Known.NOT_PROVED in known:
-            return Known.NOT_PROVED
-        return Known.UNKNOWN if Known.UNKNOWN in known else Known.PROVED
+        if not assumed.begins or KnownVerdict.NOT_PROVED in known:
+            return KnownVerdict.NOT_PROVED
+        return KnownVerdict.UNKNOWN if KnownVerdict.UNKNOWN in known else KnownVerdict.PROVED
 
-    def _obligation(self, level: str, key: Key) -> Known:
+    def _obligation(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an obligation in its level's environment alone."""
         verdicts = self.known.get(level)
         if verdicts is None:
-            return Known.UNKNOWN
+            return KnownVerdict.UNKNOWN
         claim = verdicts.claims.get(key)
-        return Known.PROVED if claim is not None and claim.verdict in ACCEPTED else Known.NOT_PROVED
+        return (
+            KnownVerdict.PROVED
+            if claim is not None and claim.verdict in ACCEPTED
+            else KnownVerdict.NOT_PROVED
+        )
 
-    def of_obligation(self, level: str, key: Key) -> Known:
+    def of_obligation(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an obligation over the whole chain of levels."""
         known = self._obligation(level, key)
-        if known is not Known.PROVED:
+        if known is not KnownVerdict.PROVED:
             return known
         if not self._proved(level, key):
             return self._given(level, key)
-        return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
+        return (
+            KnownVerdict.TRUSTED
+            if self._closed(level, key).verdict is Verdict.TRUSTED
+            else KnownVerdict.PROVED
+        )
 
-    def _given(self, level: str, key: Key) -> Known:
+    def _given(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an accepted claim that rests on one that is not accepted: conditional, or unknown."""
         whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
-        return Known.CONDITIONAL if whole else Known.UNKNOWN
+        return KnownVerdict.CONDITIONAL if whole else KnownVerdict.UNKNOWN
 
     def _closed(self, level: str, key: Key) -> Closed:
         return self.closed.get((level, key), UNLOOKED_AT)
@@ -211,25 +221,25 @@ class KnownSystem:
         """Spell the assumptions of tables that a claim trusts."""
         return declared(self._closed(level, key).trusts)
 
-    def of_level(self, level: str) -> Known:
+    def of_level(self, level: str) -> KnownVerdict:
         """Return whether every essential obligation of a level is proved."""
         verdicts = self.known.get(level)
         if verdicts is None:
-            return Known.UNKNOWN
+            return KnownVerdict.UNKNOWN
         if verdicts.open:
-            return Known.NOT_PROVED
+            return KnownVerdict.NOT_PROVED
         if not self._proved(level, RUNS):
             return self._given(level, RUNS)
-        return Known.PARTLY if verdicts.unstated else Known.PROVED
+        return KnownVerdict.PARTLY if verdicts.unstated else KnownVerdict.PROVED
 
     @property
-    def whole(self) -> Known:
+    def whole(self) -> KnownVerdict:
         """The state of knowledge about the whole system."""
         known = {self.of_level(level.name) for level in self.outline.levels}
-        if Known.NOT_PROVED in known or self.broken:
-            return Known.NOT_PROVED
-        worst = (Known.UNKNOWN, Known.CONDITIONAL, Known.PARTLY)
-        return next((grade for grade in worst if grade in known), Known.PROVED)
+        if KnownVerdict.NOT_PROVED in known or self.broken:
+            return KnownVerdict.NOT_PROVED
+        worst = (KnownVerdict.UNKNOWN, KnownVerdict.CONDITIONAL, KnownVerdict.PARTLY)
+        return next((grade for grade in worst if grade in known), KnownVerdict.PROVED)
 
     def missing(self, level: str) -> tuple[str, ...]:
         """Tell why a level without open obligations is not wholly proved: claims it rests on, and obligations not stated."""

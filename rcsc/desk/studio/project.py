@@ -16,7 +16,7 @@ from rcsc.desk.studio.plots import Plots
 from rcsc.desk.studio.runs.live import LANE, WATCHED, Live, Pace
 from rcsc.desk.studio.runs.logs import Logs
 from rcsc.desk.studio.runs.timeline import TimeLine
-from rcsc.desk.studio.scene import Cell, Drawer
+from rcsc.desk.studio.scene import Drawer, Scene
 from rcsc.desk.studio.share.sharing import Findings, Moments
 from rcsc.desk.studio.tables.desk import Desk
 from rcsc.desk.studio.tables.editing import Tables
@@ -52,7 +52,7 @@ def concerns(
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do, first)
     live.opened.append(lambda session: _sees(session, desk))
-    cell = Cell(time, hub.tell, drawer)
+    cell = Scene(time, hub.tell, drawer)
     return (
         live,
         time,

@@ -64,7 +64,7 @@ class Poses:
         return self.packed[place] if place >= 0 else None
 
 
-class Cell(Concern):
+class Scene(Concern):
     """Answers how it looks outside the levels; in the lane of the run."""
 
     name, lane = "cell", LANE

@@ -6,7 +6,7 @@ In: a text and a proposal. Out: the text with it. Nothing is trusted of what com
 import re
 from collections.abc import Sequence
 
-from rcsc.base.diagnostics.diagnostic import Change, Diagnostic, Place, Proposal
+from rcsc.base.diagnostics.diagnostic import Change, ChangeKind, Diagnostic, Proposal
 from rcsc.base.diagnostics.source import Source
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
@@ -74,20 +74,20 @@ def spliced(text: str, splices: Sequence[_Splice]) -> str:
 
 
 def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
-    if change.place is Place.LINE:
+    if change.place is ChangeKind.LINE:
         return _new_line(text, table, change)
     at, rows = _line(table, change.line)
     if not rows:
         return None
     match change.place:
-        case Place.CELL:
+        case ChangeKind.CELL:
             return _cell(text, table, at, change.column, change.texts[0])
-        case Place.SAME:
+        case ChangeKind.SAME:
             stub = joined_cells(rows).conditions[0]
             same = [cell.text for cell in stub_of(stub).same]
             word = f"{stub.text}, {change.texts[0]}" if same and stub.text.endswith(same[-1]) else ""
             return _over(text, stub, word or f"{stub.text} same {', '.join(change.texts)}", rows)
-        case Place.UNREACHABLE:
+        case ChangeKind.UNREACHABLE:
             return _over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
         case _:
             every = [row for part in table.parts for row in part.lines[at]]

@@ -60,7 +60,7 @@ from rcsc.lang.model import (
     key_bounds,
 )
 from rcsc.proof.certify.execution import Owed, Start
-from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.owed import Debt, Debts
 from rcsc.proof.certify.settle import (
     Ask,
@@ -252,13 +252,13 @@ class _Check:
             name = f"{debt.too_long}: {debt.why}"
             self.unchecked[name] = Unchecked(name, debt.written or self.program.tables[0].span, "")
         shown: set[int] = set()
-        paths: dict[Term, Known] = {}
+        paths: dict[Term, KnownSpans] = {}
         for owed in debt.owed:
             if self.settler.work > MOST_WORK:
                 self.unchecked.setdefault(owed.name, Unchecked(owed.name, owed.written, ""))
                 continue
             if owed.path not in paths:
-                paths[owed.path] = Known((*debt.hypotheses, owed.path), shown)
+                paths[owed.path] = KnownSpans((*debt.hypotheses, owed.path), shown)
                 self.settler.work += paths[owed.path].work
             outcome = self.settler.settle(debt.hypotheses, owed.path, owed.good, paths[owed.path])
             if isinstance(outcome, Shown):

@@ -15,7 +15,7 @@ ROUNDS = 2
 """How often the hypotheses are read: what one says may sharpen another."""
 
 
-class Known:
+class KnownSpans:
     """Spans under some hypotheses.
 
     Attributes:

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rcsc.proof.certify.known import Known
+from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.values import (
     BOOL,
     INT,
@@ -86,7 +86,7 @@ class Settler:
     def __init__(self, terms: Terms, ask: Ask | None, first: Mapping[str, Number]) -> None:
         self.terms, self.ask, self.first, self.work = terms, ask, first, 0
 
-    def settle(self, hypotheses: Sequence[Term], path: Term, good: Term, known: Known) -> Outcome:
+    def settle(self, hypotheses: Sequence[Term], path: Term, good: Term, known: KnownSpans) -> Outcome:
         """Settle whether `good` holds wherever the path is taken; `known` are the spans on the path."""
         before = known.work
         by_spans = known.impossible or known.span(good) == (1, 1)
@@ -105,7 +105,7 @@ class Settler:
             return Shown()
         return Fails(()) if answer is CaseAnswer.SOME else Left(question)
 
-    def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
+    def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: KnownSpans) -> Outcome | None:
         """Try all values of the obligation's variables, and of those that hypotheses tie to them; None where these are too many.
 
         Hypotheses about other variables are tried afterwards, part by part: a failing case counts only where they can hold.
@@ -168,7 +168,7 @@ class Settler:
 # --- cases -----------------------------------------------------------------------------
 
 
-def _tied(wanted: Term, hypotheses: Sequence[Term], known: Known) -> list[Term] | None:
+def _tied(wanted: Term, hypotheses: Sequence[Term], known: KnownSpans) -> list[Term] | None:
     """Return the hypotheses tied to the term while all cases are few enough to try; None where the term alone has too many."""
     used: list[Term] = []
     leaves = set(variables(wanted))
@@ -193,11 +193,11 @@ def variables(*terms: Term) -> list[Term]:
     return [term for term in parts_first(*terms) if term.op == "variable"]
 
 
-def _extent(term: Term, known: Known) -> tuple[Number, Number]:
+def _extent(term: Term, known: KnownSpans) -> tuple[Number, Number]:
     return known.span(term) or (term.low, term.high)
 
 
-def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
+def _few(wanted: Iterable[Term], known: KnownSpans, size: int) -> bool:
     """Return whether all cases of the variables can be tried."""
     total = size
     for term in wanted:
@@ -210,7 +210,7 @@ def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
     return True
 
 
-def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
+def _crossed(wanted: Sequence[Term], known: KnownSpans) -> dict[Term, Any]:
     """Return every combination of the variables' values, as one array a variable."""
     axes = []
     for term in wanted:
@@ -266,7 +266,7 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
         OverflowError: A whole number is too large to become a double.
     """
     # whole numbers stay in 64 bits where the spans of all of them do
-    known = Known((), ())
+    known = KnownSpans((), ())
     parts = parts_first(wanted)
     spans = [known.span(part) for part in parts if part.sort == INT]
     wide = any(span is None or not all(isfinite(end) and abs(end) < _FIT for end in span) for span in spans)

@@ -8,10 +8,10 @@ from itertools import zip_longest
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import (
     Change,
+    ChangeKind,
     Diagnostic,
     Effects,
     Label,
-    Place,
     Proposal,
     Severity,
     WitnessColumn,
@@ -141,7 +141,7 @@ def _others(
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)
         title = f"declare the DEFAULT line of table `{table.name}` unreachable"
-        change = Change(Place.UNREACHABLE, str(table.default.name))
+        change = Change(ChangeKind.UNREACHABLE, str(table.default.name))
         yield Diagnostic(
             Code.DEFAULT_DEAD,
             message,
@@ -199,7 +199,7 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
             if uppers
             else ()
         )
-        without = Change(Place.NO_LINE, str(table.lines[line].name))
+        without = Change(ChangeKind.NO_LINE, str(table.lines[line].name))
         gone = Proposal(f"delete {name}", str(table.name), "no input matches it", (without,))
         message = f"{name} can never match"
         return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=(gone,))
@@ -252,7 +252,7 @@ def _proposals(
         proposals.append(Proposal(title, str(table.name), proved, changes, told, whole=False))
     if effects is not None and effects.same:
         title = f"say that line `{second.name}` does the same as `{first.name}`"
-        change = Change(Place.SAME, str(second.name), texts=(str(first.name),))
+        change = Change(ChangeKind.SAME, str(second.name), texts=(str(first.name),))
         keep = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
         proved = "both do the same wherever both match"
         proposals.append(Proposal(title, str(table.name), proved, (change,), (keep,), whole=False))
@@ -354,7 +354,7 @@ def _adding(table: Table, row: NewLine) -> Proposal:
     which = "all" if row.closes else "some"
     title = f"add a line to table `{table.name}` for {which} of the inputs that no line matches"
     proved = "it closes the gap" if row.closes else "it closes this part of the gap"
-    change = Change(Place.LINE, texts=row.cells)
+    change = Change(ChangeKind.LINE, texts=row.cells)
     proved += " and overlaps no other line"
     return Proposal(title, str(table.name), proved, (change,), (f"{row.told}: ", ""), row.closes)
 

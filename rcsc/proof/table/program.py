@@ -75,7 +75,7 @@ class ProgramVerdict:
         return program_certificate(self.program, tables)
 
 
-class Known(Protocol):
+class EarlierProofs(Protocol):
     """Results of an earlier proof in this process, for a caller that proves one text after another."""
 
     def verdict(self, program: Program, table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
@@ -105,7 +105,7 @@ def prove_program(
     program: Program,
     options: Options,
     only: Collection[TableName] | None = None,
-    known: Known | None = None,
+    known: EarlierProofs | None = None,
 ) -> ProgramVerdict:
     """Prove the program's tables (or `only` these) and everything that its procedures owe.
 
@@ -196,7 +196,7 @@ def _with_assumptions(
 
 
 def _verdicts(
-    program: Program, tables: list[Table], options: Options, undefined: Collection[str], known: Known
+    program: Program, tables: list[Table], options: Options, undefined: Collection[str], known: EarlierProofs
 ) -> tuple[TableVerdict, ...]:
     """Return each table's verdict, in order; several tables are decided in processes where the options allow several jobs."""
     defined = [table for table in tables if table.name not in undefined]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from math import gcd
 
-from rcsc.base.diagnostics.diagnostic import Change, Place
+from rcsc.base.diagnostics.diagnostic import Change, ChangeKind
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.interpret import fold
 from rcsc.lang.interval_sets import complement, holds, joined, meet, size
@@ -102,7 +102,7 @@ class PartingCell:
 
     def change(self, table: Table) -> Change:
         """Return the change of the table's text."""
-        return Change(Place.CELL, str(table.lines[self.line].name), self.column, (self.text,))
+        return Change(ChangeKind.CELL, str(table.lines[self.line].name), self.column, (self.text,))
 
 
 class Partings:
@@ -263,7 +263,7 @@ def changes_of(program: Program, table: Table, changed: Sequence[PartingCell]) -
             return ()
         texts[line, column] = text
     return tuple(
-        Change(Place.CELL, str(table.lines[line].name), column, (text,))
+        Change(ChangeKind.CELL, str(table.lines[line].name), column, (text,))
         for (line, column), text in texts.items()
     )
 

@@ -20,7 +20,7 @@ REST_TICKS = 200
 """Within which a level has answered that it rests."""
 
 
-class Row(Protocol):
+class ScriptRow(Protocol):
     """A row of any script."""
 
     @property
@@ -38,7 +38,7 @@ class Result(Protocol):
     """What became of a row of any script."""
 
     @property
-    def row(self) -> Row:
+    def row(self) -> ScriptRow:
         """The row."""
         ...
 
@@ -62,7 +62,7 @@ class Operator(Protocol):
     """Who gives orders: something outside that works through rows."""
 
     @property
-    def rows(self) -> Sequence[Row]:
+    def rows(self) -> Sequence[ScriptRow]:
         """All of them."""
         ...
 

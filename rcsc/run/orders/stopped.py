@@ -21,7 +21,7 @@ from rcsc.base.host.files.plain import read
 from rcsc.base.host.files.read import content, json_of
 from rcsc.run.description import Description
 from rcsc.run.levels import BadState, RunningLevel
-from rcsc.run.orders.operator import Row, ScriptedRun
+from rcsc.run.orders.operator import ScriptedRun, ScriptRow
 from rcsc.run.signature import generated_files
 
 FORM = 2
@@ -66,7 +66,7 @@ class RestorableOperator(Restorable, Protocol):
     """Somebody who gives orders, and can be put back."""
 
     @property
-    def rows(self) -> Sequence[Row]:
+    def rows(self) -> Sequence[ScriptRow]:
         """All rows of the script."""
         ...
 
@@ -191,7 +191,7 @@ class StoppedRuns:
         yield from self.between
 
 
-def rows_digest(rows: Sequence[Row]) -> str:
+def rows_digest(rows: Sequence[ScriptRow]) -> str:
     """Return a digest of what a script says, not of how it is spelled."""
     return _digest(_text([asdict(cast(Any, row)) for row in rows]))
 

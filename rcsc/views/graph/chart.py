@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.views.graph import labels
-from rcsc.views.graph.composites import Chart, ChartArrow, Composite, Row, inside
+from rcsc.views.graph.composites import ArrowLine, Chart, ChartArrow, Composite, inside
 from rcsc.views.graph.curves import clear
 from rcsc.views.graph.drawing import folded as wrapped
 from rcsc.views.graph.drawing import plain
@@ -174,12 +174,12 @@ def _words(kind: str, text: str, whole: str = "") -> SheetRow:
     return SheetRow("", texts, f"{text}\n{whole}" if whole else text)
 
 
-def _staying(row: Row) -> SheetRow:
+def _staying(row: ArrowLine) -> SheetRow:
     edge = row.edge
     return SheetRow(row.line, (*_guard(edge, "stays"), *_does(edge)), _whole(row))
 
 
-def _leading(rows: Sequence[Row]) -> Iterator[SheetRow]:
+def _leading(rows: Sequence[ArrowLine]) -> Iterator[SheetRow]:
     """Yield the lines on an arrow; of many with the same guard and actions, those after the first name that one."""
     first: dict[tuple[tuple[str, str], ...], str] = {}
     for row in rows:
@@ -236,7 +236,7 @@ def _cut(line: str) -> Iterator[str]:
     yield line
 
 
-def _whole(row: Row) -> str:
+def _whole(row: ArrowLine) -> str:
     edge = row.edge
     said = [
         row.line and f"line {row.line}",

@@ -32,7 +32,7 @@ _WORTH = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ArrowLine:
     """A line on an arrow, or in a state where it stays.
 
     Attributes:
@@ -60,7 +60,7 @@ class ChartArrow:
 
     source: str
     target: str
-    rows: tuple[Row, ...]
+    rows: tuple[ArrowLine, ...]
     dashed: bool = False
 
 
@@ -76,7 +76,7 @@ class Composite:
 
     name: str
     states: tuple[str, ...]
-    stays: tuple[Row, ...] = ()
+    stays: tuple[ArrowLine, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class Chart:
     graph: StateGraph
     composites: tuple[Composite, ...]
     arrows: tuple[ChartArrow, ...]
-    stays: Mapping[str, tuple[Row, ...]]
+    stays: Mapping[str, tuple[ArrowLine, ...]]
     doing: Mapping[str, tuple[str, ...]]
 
 
@@ -105,15 +105,15 @@ def folded(graph: StateGraph) -> Chart:
     composites = _composites(
         graph, [*_saved(fans, arrows), *((states, len(states) - 1) for states in waiting.values())]
     )
-    stays: dict[str, list[Row]] = {}
+    stays: dict[str, list[ArrowLine]] = {}
     for (line, _), states in waiting.items():
         rows = [edge for edge in loops if edge.line == line and edge.source in states]
         group = next((each for each in composites if set(each.states) == set(states)), None)
         if group is not None:
-            stays.setdefault(group.name, []).append(Row(line, (), tuple(rows)))
+            stays.setdefault(group.name, []).append(ArrowLine(line, (), tuple(rows)))
             loops = [edge for edge in loops if edge not in rows]
     for edge in loops:
-        stays.setdefault(edge.source, []).append(Row(edge.line, (), (edge,)))
+        stays.setdefault(edge.source, []).append(ArrowLine(edge.line, (), (edge,)))
     return Chart(
         graph,
         tuple(replace(each, stays=tuple(stays.pop(each.name, ()))) for each in composites),
@@ -148,7 +148,7 @@ def collapsed(chart: Chart, hidden: Collection[str]) -> Chart:
         each.name for each in chart.composites if any(set(each.states) < set(more.states) for more in outer)
     }
     stand_in |= {name: stand_in[_of(chart, name).states[0]] for name in gone}
-    moved: dict[tuple[str, str, bool], list[Row]] = {}
+    moved: dict[tuple[str, str, bool], list[ArrowLine]] = {}
     for arrow in chart.arrows:
         source, target = (stand_in.get(end, end) for end in (arrow.source, arrow.target))
         if source == target and source in names:
@@ -259,12 +259,12 @@ def _arrows(
         yield ChartArrow(source, target, tuple(_rows(own, states.get(source, (source,)))), dashed)
 
 
-def _rows(edges: Sequence[Edge], every: tuple[str, ...]) -> Iterator[Row]:
+def _rows(edges: Sequence[Edge], every: tuple[str, ...]) -> Iterator[ArrowLine]:
     """Yield one row for each line; two where some of its edges are decided by procedures, and others are not."""
     for (line, _), group in groupby(edges, key=lambda edge: (edge.line, edge.decided)):
         own = tuple(group)
         sources = tuple(edge.source for edge in own)
-        yield Row(line, () if set(sources) == set(every) else sources, own)
+        yield ArrowLine(line, () if set(sources) == set(every) else sources, own)
 
 
 def _of(chart: Chart, name: str) -> Composite:

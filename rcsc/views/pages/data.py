@@ -12,7 +12,7 @@ from rcsc.run.description import BadDescription, Description, needs_data
 from rcsc.run.log.read import Log
 from rcsc.run.plant.load import installed
 from rcsc.run.signature import Signature
-from rcsc.views.pages.drawn import Cell
+from rcsc.views.pages.drawn import DrawnCell
 
 
 class Data(Protocol):
@@ -43,7 +43,7 @@ class Data(Protocol):
         """Yield a table for people: its heading, then its rows."""
         ...
 
-    def drawn(self, log: Log, system: Description, signs: Mapping[str, Signature]) -> Cell:
+    def drawn(self, log: Log, system: Description, signs: Mapping[str, Signature]) -> DrawnCell:
         """Return the world outside the levels, to be drawn from a log."""
         ...
 

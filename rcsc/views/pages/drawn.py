@@ -17,7 +17,7 @@ class Drawing(Protocol):
         ...
 
 
-class Cell(Protocol):
+class DrawnCell(Protocol):
     """The world outside the levels of a log."""
 
     @property

@@ -12,7 +12,7 @@ from rcsc.base.host.files import write_atomically
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
 from rcsc.run.log.ticks import LoggedTick, frames
-from rcsc.views.pages.drawn import Cell, Drawing
+from rcsc.views.pages.drawn import Drawing, DrawnCell
 from rcsc.views.pages.frame import PAGES
 
 
@@ -33,7 +33,7 @@ class _Tick:
     drawn: Drawing | None
 
 
-def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> None:
+def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> None:
     """Write the page.
 
     Args:
@@ -49,7 +49,7 @@ def trace(path: Path, log: Log, finding: LoggedFinding, cell: Cell | None, why_n
     write_atomically(path, page(log, finding, cell, why_not).encode())
 
 
-def page(log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "") -> str:
+def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> str:
     """Return the page; arguments are as in `trace`."""
     return PAGES.get_template("trace.html.jinja").render(
         finding=finding,
@@ -63,7 +63,7 @@ def page(log: Log, finding: LoggedFinding, cell: Cell | None, why_not: str = "")
 _SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
 
 
-def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: Cell | None) -> _Tick:
+def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell | None) -> _Tick:
     broken = frame.tick == finding.broken_at
     mark = "broken here" if broken else "what comes of it" if frame.tick > finding.broken_at else ""
     drawn = None if cell is None else cell.drawn(frame.tick)
@@ -86,7 +86,7 @@ def _notes(log: Log, finding: LoggedFinding) -> list[str]:
     return notes
 
 
-def about_cell(cell: Cell | None, why_not: str) -> str:
+def about_cell(cell: DrawnCell | None, why_not: str) -> str:
     """Return a sentence about the source of the cell's pictures; arguments are as in `trace`."""
     if cell is None:
         return f"No cell is drawn: {why_not}"

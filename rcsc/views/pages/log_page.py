@@ -12,7 +12,7 @@ from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
 from rcsc.run.log.ticks import LoggedTick, Order, Reported, TickValue, frames
-from rcsc.views.pages.drawn import Cell
+from rcsc.views.pages.drawn import DrawnCell
 from rcsc.views.pages.finding_page import about_cell
 from rcsc.views.pages.report import CellPicture, Matched, ReportRow, Story
 from rcsc.views.pages.witness import FRAMES_APART, MOST_SERIES
@@ -43,7 +43,7 @@ class _Ordered:
 
 def story_of(
     log: Log,
-    cell: Cell | None = None,
+    cell: DrawnCell | None = None,
     why_not: str = "",
 ) -> Story:
     """Return the story of the log, for a page.
@@ -143,7 +143,7 @@ def _outside(log: Log, known: Collection[str]) -> Iterator[str]:
             )
 
 
-def _pictures(log: Log, cell: Cell | None, ordered: Sequence[_Ordered]) -> list[CellPicture]:
+def _pictures(log: Log, cell: DrawnCell | None, ordered: Sequence[_Ordered]) -> list[CellPicture]:
     """Return pictures of the cell at even distances, the last tick among them."""
     if cell is None or not log.ticks:
         return []

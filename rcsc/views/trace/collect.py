@@ -22,7 +22,7 @@ from rcsc.driver.settings import Conclusion, Settings
 from rcsc.driver.trials import whole_vectors
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
-from rcsc.views.trace.matrix import Known, Matrix, matrix, of_system
+from rcsc.views.trace.matrix import Matrix, ProgramFacts, matrix, of_system
 from rcsc.views.trace.page import page
 from rcsc.views.trace.proofs import property_proofs, table_proofs
 from rcsc.views.trace.requirements import covered, findings, listed, places
@@ -104,7 +104,7 @@ def _matrix(
     settings.progress(f"tracing {program.program.file}")
     plan = planned(program)
     [proof] = [proof for proof in project.proofs if proof.proved is program]
-    known = Known(
+    known = ProgramFacts(
         table_proofs(proof.tables),
         tuple((found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics),
         whole_vectors(program, settings) if wanted.vectors else None,

@@ -182,7 +182,7 @@ class Matrix:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class ProgramFacts:
     """What others found out of a program.
 
     Attributes:
@@ -200,7 +200,7 @@ class Known:
     sources: Mapping[str, Source] = field(default_factory=dict)
 
 
-def matrix(plan: Plan, files: Mapping[str, str], known: Known) -> Matrix:
+def matrix(plan: Plan, files: Mapping[str, str], known: ProgramFacts) -> Matrix:
     """Build the matrix of a program from its plan, its emitted files and what is known of it."""
     code = {path: text for path, text in files.items() if path.endswith((".c", ".h", ".py"))}
     pieces = tuple(_pieces(plan, code))
@@ -254,7 +254,7 @@ def untraced(code: Mapping[str, str], pieces: Iterable[Piece]) -> Iterator[str]:
 class _Build:
     """Reads one program for its matrix."""
 
-    def __init__(self, plan: Plan, known: Known) -> None:
+    def __init__(self, plan: Plan, known: ProgramFacts) -> None:
         self.plan, self.known = plan, known
         self.taking = {} if known.vectors is None else dict(_taking(known.vectors))
         self.program: Program = plan.program

@@ -7,7 +7,7 @@ from pathlib import Path
 from rcsc.base.diagnostics.report import TableReport
 from rcsc.base.host.cache import Cache, cache_of
 from rcsc.compose.proof.standing import PROPERTY
-from rcsc.compose.proof.standing import Known as Standing
+from rcsc.compose.proof.standing import KnownVerdict as Standing
 from rcsc.driver.outline import known
 from rcsc.lang.model import Program
 from rcsc.lang.project import systems_above

@@ -18,8 +18,8 @@ from rcsc.code.emit.code_tree import (
     Let,
     Line,
     Loop,
+    MemberPath,
     Name,
-    Place,
     Prefix,
     Set,
     Stmt,
@@ -37,7 +37,7 @@ from rcsc.lang.model import Bool, Enum, Int, Real, Variable, key_bounds
 def trace(c: CProgram, fault: Code, at: Code) -> Body:
     """Return statements that set the trace of a cycle that has run no line."""
     told = {"line": NONE, "fault": fault, "fault_at": at} | dict.fromkeys(c.names.failed, Constant(0))
-    return tuple(Set(Place((name,)), value) for name, value in told.items())
+    return tuple(Set(MemberPath((name,)), value) for name, value in told.items())
 
 
 def admit_function(c: CProgram, reals: bool) -> Function:
@@ -112,7 +112,7 @@ def _all_admitted(c: CProgram, inputs: Sequence[Variable]) -> Iterator[Stmt]:
     for (array, kind, _), group in groupby(inputs, lambda v: (_array_of(c, v), v.type, v.admit)):
         leaves = tuple(group)
         if array and isinstance(kind, Real) and len(leaves) > 1 and leaves[0].admit is not model.Admit.CLAMP:
-            body = tuple(admitted(c, leaves[0], Place((*array, Name("k")))))
+            body = tuple(admitted(c, leaves[0], MemberPath((*array, Name("k")))))
             if body:
                 yield Loop("k", 0, len(leaves) - 1, body, type="uint32_t")
         else:
@@ -152,7 +152,7 @@ def check_function(c: CProgram) -> Function:
         for v, test in zip(c.program.variables, tests, strict=False)
         if v.kind is not model.Kind.INPUT
     ]
-    foreign = infix("!=", Place((DIGEST,)), Name(c.names.digest))
+    foreign = infix("!=", MemberPath((DIGEST,)), Name(c.names.digest))
     asked = [(Name(c.names.checks[1]), foreign), *((at, test) for at, test in tests if test is not None)]
     doc = (
         f"Whether the state may be gone on from: {c.names.checks[0]}; {c.names.checks[1]} where other tables made it; else the position "

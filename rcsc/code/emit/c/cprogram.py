@@ -16,8 +16,8 @@ from rcsc.code.emit.code_tree import (
     Function,
     Invoke,
     Line,
+    MemberPath,
     Name,
-    Place,
     Set,
     Stmt,
     infix,
@@ -111,7 +111,7 @@ def discarded(name: Name) -> Do:
 
 def touches_state(body: Body) -> bool:
     """Return whether the code reads or writes the state."""
-    return any(isinstance(code, Place) or code == STATE for code in read(body))
+    return any(isinstance(code, MemberPath) or code == STATE for code in read(body))
 
 
 def first_of(asked: Sequence[tuple[Code, Code]]) -> Iterator[Stmt]:

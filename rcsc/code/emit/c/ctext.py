@@ -26,8 +26,8 @@ from rcsc.code.emit.code_tree import (
     Let,
     Line,
     Loop,
+    MemberPath,
     Name,
-    Place,
     Prefix,
     Round,
     Set,
@@ -224,10 +224,10 @@ def _plain(code: Code) -> bool:
     match code:
         case Constant(value=value, type=kind):
             return kind not in FLOATS or value >= 0
-        case Place(steps=steps):
+        case MemberPath(steps=steps):
             return all(isinstance(step, str | Name) for step in steps)
         case Cast(type=kind, operand=operand):
-            return kind not in FLOATS and isinstance(operand, Name | Place) and _plain(operand)
+            return kind not in FLOATS and isinstance(operand, Name | MemberPath) and _plain(operand)
         case _:
             return isinstance(code, Name)
 
@@ -303,9 +303,9 @@ class CText(Text):
         """The condition that a fault stands."""
         return infix("!=", FAULT, Name(self.names.faults[0]))
 
-    def place(self, leaf: str) -> Place:
+    def place(self, leaf: str) -> MemberPath:
         """Return the place of a leaf in the state."""
-        return Place(self.names.paths[leaf])
+        return MemberPath(self.names.paths[leaf])
 
     def function(self, procedure: str) -> str:
         """Return the name of a procedure's function."""
@@ -458,14 +458,14 @@ class CText(Text):
         """The ranges here, met with those that the lines state of variables not written since."""
         return self._ranges.met(self._stated)
 
-    def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
+    def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> MemberPath:
         """Return an array element by a computed index, which is left out where it can only be 0."""
         steps: tuple[str | Code, ...] = self.names.paths[leaves[0]]
         if index is not None and len(leaves) > 1:
             pairs = zip(steps, self.names.paths[leaves[1]], strict=True)
             at = next(at for at, (step, other) in enumerate(pairs) if step != other)
             steps = (*steps[:at], self._index(index, len(leaves)), *steps[at + 1 :])
-        return Place(steps, c_type(kind))
+        return MemberPath(steps, c_type(kind))
 
     def _index(self, index: Expr, length: int) -> Code:
         """Return an index of an array of this length."""
@@ -667,7 +667,7 @@ class CText(Text):
         """Return a block with the value in it, and a chain of `if`."""
         self._nested += 1
         kind, given = statement.subject.type, self.whole(statement.subject)
-        held = c_type(kind) if isinstance(given, Place) else local_type(kind)
+        held = c_type(kind) if isinstance(given, MemberPath) else local_type(kind)
         subject = Name("subject" if self._nested == 1 else f"subject_{self._nested}", held)
         let = Let(f"const {held}", subject.text, given)
         before = self._ranges

@@ -29,8 +29,8 @@ from rcsc.code.emit.code_tree import (
     Leave,
     Let,
     Line,
+    MemberPath,
     Name,
-    Place,
     Prefix,
     Round,
     Set,
@@ -102,7 +102,7 @@ def assumption_functions(c: CProgram) -> Iterator[Function]:
 def _told(c: CProgram, place: int, stops: tuple[int, ...]) -> Body:
     """Return code that marks an assumption that fails; the first that stops and fails ends the cycle."""
     word, bit = divmod(place, FAILED_BITS)
-    failed = Place((c.names.failed[word],))
+    failed = MemberPath((c.names.failed[word],))
     shift = Constant(bit, "uint32_t") if word else Cast("uint32_t", Name(c.names.assumptions[place]))
     kind = failed_type(len(c.plan.monitored))
     one = Cast(kind, Constant(1, kind))  # the essential type of a bare 1 has eight bits
@@ -238,7 +238,7 @@ def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body], 
         return
     kind, given = choice.selector.type, c.text.whole(choice.selector)
     chosen = Name(name)
-    yield Let(f"const {c_type(kind) if isinstance(given, Place) else local_type(kind)}", name, given)
+    yield Let(f"const {c_type(kind) if isinstance(given, MemberPath) else local_type(kind)}", name, given)
     arms = ((infix("==", chosen, c.text.constant(kind, value)), run(name)) for value, name in choice.tables)
     yield Branch(
         tuple(arms),
@@ -249,7 +249,7 @@ def _chosen(c: CProgram, choice: model.TableChoice, run: Callable[[str], Body], 
 def init_function(c: CProgram) -> Function:
     """Return the function that makes the initial state."""
     values = (assigned(c, variable, variable.initial) for variable in c.program.variables)
-    digest = Set(Place((DIGEST,)), Name(c.names.digest))
+    digest = Set(MemberPath((DIGEST,)), Name(c.names.digest))
     return on_state(
         c,
         "Every variable's initial value.",

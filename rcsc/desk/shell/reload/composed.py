@@ -10,7 +10,7 @@ from pathlib import Path
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.report import named
 from rcsc.base.host.cache import Cache, open_cache
-from rcsc.compose.proof.standing import Known, KnownSystem
+from rcsc.compose.proof.standing import KnownSystem, KnownVerdict
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.reload.reload import Origin, source_of
 from rcsc.desk.shell.reload.sources import KeptSources, kept
@@ -51,17 +51,17 @@ def together(
     if prove and not edited and cache is not None:
         prove_levels(plant.path, cache)
     known_system = None if cache is None or edited else known(plant.path, cache)
-    verdict = Known.UNKNOWN if known_system is None else known_system.of_level(level)
-    if known_system is not None and verdict is Known.NOT_PROVED:
+    verdict = KnownVerdict.UNKNOWN if known_system is None else known_system.of_level(level)
+    if known_system is not None and verdict is KnownVerdict.NOT_PROVED:
         raise _refused(
             plant,
             level,
             "".join(f"\nnot proved: {obligation}" for obligation in known_system.known[level].open),
         )
-    if verdict is Known.PROVED:
+    if verdict is KnownVerdict.PROVED:
         others = (spec.name for spec in plant.system.levels if spec.name != level)
         edited = [name for name in others if not compiled(name)]
-    if verdict is Known.PROVED and not edited:
+    if verdict is KnownVerdict.PROVED and not edited:
         return f"level `{level}` is proved together with its neighbours, as the files of {plant.path} stand"
     why = _unknown(plant, level, known_system, edited)
     if prove:
@@ -90,7 +90,7 @@ def _unknown(plant: Origin, level: str, known_system: KnownSystem | None, edited
     if known_system is not None and known_system.broken:
         assumption = known_system.broken[0]
         return f"level `{assumption.level}` assumes that {assumption.assumed}, which its neighbour is not proved to keep"
-    if known_system is not None and known_system.of_level(level) is not Known.UNKNOWN:
+    if known_system is not None and known_system.of_level(level) is not KnownVerdict.UNKNOWN:
         return named(known_system.missing(level))
     return f"`rcsc prove {plant.path}` decides it"
 

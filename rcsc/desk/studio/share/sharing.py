@@ -14,7 +14,7 @@ from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
-from rcsc.desk.studio.scene import Cell
+from rcsc.desk.studio.scene import Scene
 from rcsc.desk.studio.share.document import of_film, of_finding
 from rcsc.desk.studio.share.film import film
 from rcsc.desk.studio.tables import shown
@@ -29,7 +29,7 @@ class Moments(Concern):
 
     name, lane = "share", LANE
 
-    def __init__(self, hub: Hub, time: TimeLine, cell: Cell) -> None:
+    def __init__(self, hub: Hub, time: TimeLine, cell: Scene) -> None:
         """Args: hub: Does things in lanes; time: The run; cell: What stands outside."""
         self._hub, self._time, self._cell = hub, time, cell
 

@@ -35,7 +35,7 @@ _Splice = tuple[int, int, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class GridCell:
     """A cell: line and column from 0; conditions of all parts are counted first, then actions. Line -1 is the heading."""
 
     line: int
@@ -99,7 +99,7 @@ def _fitted(cells: Cells, heading: Cells, past: int) -> Cells:
 # --- changes ------------------------------------------------------------------------------
 
 
-def with_cells(text: str, name: str, changes: Sequence[tuple[Place, str]]) -> str:
+def with_cells(text: str, name: str, changes: Sequence[tuple[GridCell, str]]) -> str:
     """Write cells, headings and stubs; a line's new name is written in every part, and where other lines name it.
 
     Raises:
@@ -328,7 +328,7 @@ def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
     return formatted(Source("", after), "\n") or after if before != after else after
 
 
-def _cell_splices(text: str, table: WrittenTable, place: Place, new: str) -> Iterator[_Splice]:
+def _cell_splices(text: str, table: WrittenTable, place: GridCell, new: str) -> Iterator[_Splice]:
     """Yield what writes a cell into the first of its rows, and takes it out of the others."""
     rows, cell = _found(table, place)
     whole = joined_cells(rows)
@@ -342,7 +342,7 @@ def _cell_splices(text: str, table: WrittenTable, place: Place, new: str) -> Ite
         yield (*whole_line(text, row), "") if alone and "#" not in row else (start, end, "")
 
 
-def _found(table: WrittenTable, place: Place) -> tuple[tuple[RowText, ...], Cell]:
+def _found(table: WrittenTable, place: GridCell) -> tuple[tuple[RowText, ...], Cell]:
     """The rows of a line, or of the heading, in the part that has a column; and the cell."""
     column, every = place.column, [joined_cells(part.heading) for part in table.parts]
     conditions = sum(len(heading.conditions) - 1 for heading in every)

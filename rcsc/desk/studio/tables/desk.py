@@ -22,7 +22,7 @@ from rcsc.desk.editor.workspace import Checked, Workspace
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import PROVER
 from rcsc.desk.studio.tables.document import Document
-from rcsc.desk.studio.tables.shown import Json, Known, document
+from rcsc.desk.studio.tables.shown import Json, TextFindings, document
 from rcsc.lang.project import listed, load, project_root
 from rcsc.lang.written.tables import tables_of
 from rcsc.run.description import BadDescription, description, places
@@ -71,7 +71,7 @@ class Desk:
         self._tell, self._do = tell, do
         self._lock = threading.RLock()
         self._open: dict[str, Document] = {}
-        self._known: dict[str, Known] = {}
+        self._known: dict[str, TextFindings] = {}
         self._offered: dict[tuple[str, int, int], tuple[Repair, ...]] = {}
         self._marks: dict[str, Mark] = {}
         self._looked: dict[str, Mark] = {}
@@ -311,10 +311,12 @@ class Desk:
             self._offered = {key: each for key, each in self._offered.items() if key[0] != name}
             if name in self._open:
                 seconds = time.perf_counter() - began
-                self._known[name] = Known(version if same else OUTDATED, answer, nearest, seconds, files)
+                self._known[name] = TextFindings(
+                    version if same else OUTDATED, answer, nearest, seconds, files
+                )
                 self.show(name)
 
-    def known(self, name: str, version: int) -> Known:
+    def known(self, name: str, version: int) -> TextFindings:
         """What is known of the text that a page has seen; looks at it first, where nobody has. In the lane `proof`.
 
         Raises:
@@ -331,7 +333,7 @@ class Desk:
             known = self._known.get(name) if name in self._open else None
             return known.answer if known is not None and self._sure(name) else None
 
-    def still_known(self, name: str, version: int) -> Known:
+    def still_known(self, name: str, version: int) -> TextFindings:
         """What is known of the text that a page has seen, and of all that it uses as that is now.
 
         Raises:

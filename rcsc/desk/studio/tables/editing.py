@@ -137,7 +137,7 @@ class Tables(Concern):
                 found.text, table, line + len(rows) + _over_default(found.text, table, line, column, rows)
             )
             changes = [
-                (cells.Place(line + down, column + right), new)
+                (cells.GridCell(line + down, column + right), new)
                 for down, row in enumerate(rows)
                 for right, new in enumerate(row)
                 if new is not None

@@ -22,7 +22,7 @@ Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class TextFindings:
     """What was found out about a text.
 
     Attributes:
@@ -39,7 +39,7 @@ class Known:
     files: frozenset[str]
 
 
-def document(name: str, open_file: Document, known: Known | None) -> Json:
+def document(name: str, open_file: Document, known: TextFindings | None) -> Json:
     """Return an open file: its text, its tables, and what is known of them; of a text that nobody has looked at what stands there alone."""
     lines = Lines(open_file.text)
     sure = known is not None and known.version == open_file.version
@@ -105,7 +105,7 @@ def _place(area: Area, lines: Lines) -> list[list[int]]:
     return [[place.line, place.column] for place in places]
 
 
-def _finding(file: str, lines: Lines, number: int, found: Finding, known: Known) -> Json:
+def _finding(file: str, lines: Lines, number: int, found: Finding, known: TextFindings) -> Json:
     here = found.area.file == file
     table = next((each for each in known.answer.tables if each.name == found.table), None) if here else None
     line, column = _cell(table, found.area) if table is not None else (None, None)

@@ -6,10 +6,10 @@ from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log.read import Log
 from rcsc.run.system import signatures
 from rcsc.views.pages.data import known
-from rcsc.views.pages.drawn import Cell, Drawing
+from rcsc.views.pages.drawn import Drawing, DrawnCell
 
 
-def cell_of(log: Log, path: Path) -> Cell:
+def cell_of(log: Log, path: Path) -> DrawnCell:
     """What a description's data draws of a log.
 
     Raises:
@@ -35,7 +35,7 @@ class Drawn:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._cell: Cell | None = None
+        self._cell: DrawnCell | None = None
         self._log: Log | None = None
 
     @property

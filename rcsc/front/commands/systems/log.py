@@ -23,7 +23,7 @@ from rcsc.run.log.plot import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
-from rcsc.views.pages.drawn import Cell
+from rcsc.views.pages.drawn import DrawnCell
 from rcsc.views.pages.finding_page import trace
 from rcsc.views.pages.log_page import drawn_first, story_of
 from rcsc.views.pages.report import report as run_page
@@ -181,7 +181,7 @@ def _summed(level: LoggedLevel) -> None:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
 
 
-def _cell_of(log: Log, given: Path | None) -> tuple[Cell | None, str]:
+def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
     """The cell, or None and a sentence that says why.
 
     Args:

@@ -53,7 +53,7 @@ class Compliance(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class ComplianceFinding:
     """A finding, and the deviation that it is; None for a violation."""
 
     finding: Finding
@@ -84,11 +84,11 @@ class Summary:
     """
 
     checked: Checked
-    places: tuple[Place, ...]
+    places: tuple[ComplianceFinding, ...]
     plain: bool
 
     @property
-    def unexplained(self) -> tuple[Place, ...]:
+    def unexplained(self) -> tuple[ComplianceFinding, ...]:
         """The findings without a reason; for a mandatory guideline no reason counts."""
         mandatory = {one.number for one in guidelines() if one.category is Category.MANDATORY}
         return tuple(one for one in self.places if one.deviation is None or one.guideline in mandatory)
@@ -113,7 +113,9 @@ def summary(files: Mapping[str, str]) -> Summary:
     """Check C and headers, and explain the findings by their places."""
     checked = check(files)
     findings = (*checked.findings, *own_findings(files), *_unguarded(files))
-    return Summary(checked, tuple(Place(one, explained(one, files)) for one in findings), _plain(files))
+    return Summary(
+        checked, tuple(ComplianceFinding(one, explained(one, files)) for one in findings), _plain(files)
+    )
 
 
 def _unguarded(files: Mapping[str, str]) -> Iterator[Finding]:

@@ -20,8 +20,8 @@ from rcsc.code.emit.code_tree import (
     Leave,
     Let,
     Line,
+    MemberPath,
     Name,
-    Place,
     Round,
     Set,
     Stmt,
@@ -70,7 +70,7 @@ def _class(c: CProgram, index: Index, name: str) -> Code:
             assert_never(index)
 
 
-def _above(c: CProgram, kind: model.Scalar, place: Place, low: int) -> Code:
+def _above(c: CProgram, kind: model.Scalar, place: MemberPath, low: int) -> Code:
     """Return code for the distance of a value from the least that has a class."""
     if low == 0:
         return place
