@@ -19,7 +19,7 @@ from rcsc.run.signature import Signature, Value, Values
 
 
 class Begun(StrEnum):
-    """The state from which a restarted level goes on."""
+    """The state from which a restarted level continues."""
 
     CHECKPOINT = "checkpoint"  # that of its last cycle
     ANEW = "anew"  # that is lost, or ended in a fault: the state that `adopt` says
@@ -27,7 +27,7 @@ class Begun(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Restarted:
-    """A level that was started again, between two cycles.
+    """A level that was restarted between two cycles.
 
     Attributes:
         values: All leaves, from which its next cycle begins once it has taken its inputs.
@@ -41,7 +41,7 @@ class Restarted:
 def restart(
     level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None, written: Buffers | None = None
 ) -> Restarted:
-    """Put a level where its process would begin again.
+    """Put a level into the state in which its process would begin again.
 
     Args:
         level: Whatever state it is in.
@@ -90,7 +90,7 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
 
 
 def unlike(sign: Signature, values: Values, given: Values) -> dict[int, Value]:
-    """Return what a start anew leaves, of each leaf of which it never leaves what stands in `values`.
+    """Return the leaves whose value in `values` no start anew leaves, each with the value that one leaves.
 
     Args:
         sign: The level's program.
@@ -141,7 +141,7 @@ Start: TypeAlias = Fixed | Copied | Numbered | Standing
 
 
 def adoption(sign: Signature) -> tuple[Start, ...]:
-    """Return how the leaves of a level start anew that do not start with their initial values, in the order in which they are set."""
+    """Return how leaves start anew that do not start with their initial values, in the order in which they are set."""
     return tuple(_start(sign, at, adopts) for at, adopts in sign.restart.items())
 
 

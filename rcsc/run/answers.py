@@ -31,7 +31,7 @@ _left: list[tuple[str, tuple[Value, ...]]] = []
 
 
 def __getattr__(name: str) -> Callable[..., Any]:
-    """Return the function of an extern procedure, which gives its next answer.
+    """Return the function of an extern procedure, which returns its next recorded answer.
 
     Raises:
         AttributeError: The name is none of an extern procedure.
@@ -59,7 +59,7 @@ def told(executor: Executor, answers: Answers) -> None:
 
 
 def _word(value: Value) -> int:
-    """The 64 bits of a value."""
+    """Return the 64 bits of a value."""
     if isinstance(value, float):
         (bits,) = struct.unpack("<Q", struct.pack("<d", value))
         return int(bits)
@@ -67,7 +67,7 @@ def _word(value: Value) -> int:
 
 
 def fits(c_type: str, value: Value) -> bool:
-    """Whether a C function can give the value."""
+    """Tell whether a C function of the type can return the value."""
     if c_type not in C_TYPES:
         return True
     low, high = C_TYPES[c_type]

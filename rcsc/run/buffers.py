@@ -9,14 +9,14 @@ from rcsc.run.signature import Values
 
 
 class Buffers(Protocol):
-    """What carries buffers between levels; the one interface of every transport."""
+    """A carrier of buffers between levels; the one interface of every transport."""
 
     def publish(self, name: str, values: Values) -> None:
-        """Make this the latest value."""
+        """Publish this as the latest value."""
         ...
 
     def latest(self, name: str) -> Values | None:
-        """The latest value; None before the first."""
+        """Return the latest value; None before the first."""
         ...
 
 
@@ -27,9 +27,9 @@ class CommonMemory:
         self._held: dict[str, Values] = {}
 
     def publish(self, name: str, values: Values) -> None:
-        """Make this the latest value."""
+        """Publish this as the latest value."""
         self._held[name] = values
 
     def latest(self, name: str) -> Values | None:
-        """The latest value; None before the first."""
+        """Return the latest value; None before the first."""
         return self._held.get(name)

@@ -93,7 +93,7 @@ class PlantSpec:
 
 
 def plants(path: Path, document: Document) -> tuple[PlantSpec, ...]:
-    """The plants of a description; what is wrong with them is noted in the document."""
+    """Read the plants of a description; note their errors in the document."""
     table = document.value.get("plant", {})
     if not isinstance(table, dict):
         return ()  # which its kind says
@@ -129,7 +129,7 @@ def plants(path: Path, document: Document) -> tuple[PlantSpec, ...]:
 
 
 def _check_ends(document: Document, table: Mapping[str, Any], place: KeyPath) -> None:
-    """Sensors and actuators are bound to buffers' ends that could be."""
+    """Check that sensors and actuators are bound to ends that a buffer could have."""
     buffers = document.value.get("buffers")
     for key, side in (("sensors", 0), ("actuators", 1)):
         ends = [pair[side] for pair in buffers.items()] if isinstance(buffers, dict) else []

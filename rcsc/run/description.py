@@ -35,7 +35,7 @@ from rcsc.run.declared_plant import PlantSpec, plants
 
 
 class BadDescription(BadFile):
-    """The description says something that cannot be; tells where and what."""
+    """An error in a description, with its place."""
 
 
 LONGEST_MS, MOST_LEVELS, MOST_WITHIN = 3_600_000, 10_000, 1_000_000
@@ -127,29 +127,29 @@ class Description:
     within: int = WITHIN
 
     def unfilled(self, inputs: Iterable[str]) -> tuple[str, ...]:
-        """Which of these inputs, `level.variable`, no buffer and no feed fills: they stay as they are at first."""
+        """Return those of these inputs, `level.variable`, that no buffer and no feed fills: they keep their initial values."""
         filled = {wire.target for wire in self.wires}
         filled |= {f"{level.name}.{feed.into}" for level in self.levels for feed in level.feeds}
         return tuple(name for name in inputs if name not in filled)
 
     def untaken(self, outputs: Iterable[str]) -> tuple[str, ...]:
-        """Which of these outputs, `level.variable`, no buffer takes; a `display` is for the page, where there are displays."""
+        """Return those of these outputs, `level.variable`, that no buffer takes; a `display` is for the page, where there are displays."""
         taken = {wire.source for wire in self.wires}
         taken |= {f"{level.name}.display" for level in self.levels if self.displays}
         return tuple(name for name in outputs if name not in taken)
 
     def review(self) -> Document:
-        """A fresh page for faults, with the places of this description."""
+        """Return a fresh page for errors, with the places of this description."""
         if self.document is None:
             return Document(self.name, Source(self.name, ""), {}, Code.BAD_SYSTEM)
         return replace(self.document, faults=[])
 
 
 def description(path: Path) -> Description:
-    """Read a description; its paths are seen from where it stands.
+    """Read a description; its paths are relative to its folder.
 
     Raises:
-        BadDescription: It cannot be read, or something in it cannot be; all that is wrong is told at once.
+        BadDescription: It cannot be read, or has errors; all of them are reported at once.
     """
     document = read_document(path, Code.BAD_SYSTEM, BadDescription)
     document.check(SYSTEM)
@@ -168,13 +168,13 @@ def description(path: Path) -> Description:
 
 
 def _root(path: Path, level: Mapping[str, Any]) -> Path | None:
-    """The root file of a level's program; None where there is none, which is told where it is read."""
+    """Return the root file of a level's program; None where there is none, which is reported where it is read."""
     found = places(path, str(level.get("program", level["name"])))
     return next((file for file in found if file.is_file()), None)
 
 
 def _place(path: Path, document: Document, key: str) -> Path:
-    """Where a path of the description leads: into its project, or to the folder `generated` beside that."""
+    """Resolve a path of the description: into its project, or to the folder `generated` beside that."""
     try:
         return within(
             Path(project_root(str(path))), path.parent, document.value.get(key, NO_DATA), f"path `{key}`"
@@ -201,10 +201,10 @@ def _described(path: Path, document: Document, generated: Path, data: Path) -> D
 
 
 def level_of(entry: CheckedFields) -> LevelSpec:
-    """Return a level of a description, or of a log's copy of one.
+    """Read a level of a description, or of a log's copy of one.
 
     Raises:
-        Malformed: It is none, or a name in it is none.
+        Malformed: The entry is no level, or has a bad name.
     """
     feeds = "feed" if "feed" in entry.value else "feeds"
     return LevelSpec(
@@ -218,10 +218,10 @@ def level_of(entry: CheckedFields) -> LevelSpec:
 
 
 def wire_of(source: object, target: object) -> Wire:
-    """Return a buffer between two variables, `level.variable` each.
+    """Read a buffer between two variables, `level.variable` each.
 
     Raises:
-        BadName: One of them is none.
+        BadName: One of the two is no variable.
     """
     return Wire(member(source, "buffer"), member(target, "buffer's destination"))
 
@@ -231,10 +231,10 @@ NO_DATA = ".no-data"
 
 
 def needs_data(system: Description) -> None:
-    """Refuse a system without data.
+    """Refuse a system without a database.
 
     Raises:
-        BadDescription: It names none.
+        BadDescription: It names no database.
     """
     if system.database.name == NO_DATA:
         page = system.review()
@@ -278,7 +278,7 @@ def _check_parties(document: Document) -> None:
 
 
 def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
-    """Both ends of each buffer: where it stands, the end, the other end."""
+    """Yield both ends of each buffer: its place, the end, the other end."""
     for source, target in buffers.items():
         yield ("buffers", source), source, target
         yield ("buffers", source), target, source
@@ -293,7 +293,7 @@ def _alike(party: str, levels: list[str], parties: list[str]) -> str:
 
 
 def places(path: Path, program: str) -> tuple[Path, Path]:
-    """Return where the program of a level is looked for, in order."""
+    """Return the paths where a level's program is looked for, in order."""
     return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"
 
 
@@ -327,7 +327,7 @@ class _Rows:
         return rows
 
     def all(self) -> dict[str, str]:
-        """Those that follow, then those that are written."""
+        """Return the rows that follow, then those that are written."""
         levels = [str(level["name"]) for level in self.document.value["level"]]
         for at, level in enumerate(levels):
             roles = self.roles.get(level, Neighbours())
@@ -351,7 +351,7 @@ class _Rows:
         }
 
     def _between(self, at: int, upper: str, lower: str) -> None:
-        """The two rows between levels."""
+        """Add the two rows between levels."""
         above, below = (
             self.roles[upper].commands[lower],
             self.roles.get(lower, Neighbours()).serves.get(upper),
@@ -371,7 +371,7 @@ class _Rows:
         self.rows.update(missing)
 
     def _wanted(self, source: str, target: str) -> bool:
-        """Whether a row between levels is not written; one that is half written contradicts what is declared."""
+        """Tell whether a row between levels is still missing; note one that is half written, which contradicts the declarations."""
         by_target = {to: came for came, to in self.written.items()}
         if source not in self.written and target not in by_target:
             return True
@@ -387,7 +387,7 @@ class _Rows:
         return False
 
     def _one_sided(self, at: int, says: str, other: str, word: str, end: str) -> None:
-        """Note that the other level does not say so, where no row connects them either."""
+        """Note that the other level lacks the declaration, where no row connects them either."""
         if end in self.written or end in self.written.values():
             return
         theirs = getattr(self.roles.get(other, Neighbours()), word)
@@ -400,7 +400,7 @@ class _Rows:
         )
 
     def _outside(self, at: int, row: tuple[str, str], levels: list[str]) -> None:
-        """A row to or from a party outside, unless the level's end is written."""
+        """Add a row to or from a party outside, unless the level's end is written."""
         source, target = row
         inner, outer = (source, target) if source.partition(".")[0] in levels else (target, source)
         by_target = {to: came for came, to in self.written.items()}

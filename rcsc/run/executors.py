@@ -39,11 +39,11 @@ class Executor(Protocol):
     """One level's executor with its state."""
 
     def cycle(self) -> int:
-        """Run one cycle; the fault, 0 for none."""
+        """Run one cycle; return the fault, 0 for none."""
         ...
 
     def values(self) -> Values:
-        """All leaves, then the trace."""
+        """Return all leaves, then the trace."""
         ...
 
     def put(self, first: int, values: Sequence[Value]) -> None:
@@ -51,7 +51,7 @@ class Executor(Protocol):
         ...
 
     def check(self) -> int:
-        """-1 where the state may be gone on from, else what is wrong with it (`Signature.unfit`)."""
+        """Return -1 where a cycle may begin with the state, else the number of the error (`Signature.unfit`)."""
         ...
 
 
@@ -63,7 +63,7 @@ class _Source(importlib.machinery.SourceFileLoader):
 
 
 def _module(name: str, path: Path) -> ModuleType:
-    """Return the module that a generated file is.
+    """Import the module of a generated file.
 
     Raises:
         NotBuilt: It cannot be read.
@@ -93,17 +93,17 @@ class PythonExecutor:
         self._get = attrgetter(*self._names, *sign.trace)
 
     def cycle(self) -> int:
-        """Run one cycle; the fault, 0 for none."""
+        """Run one cycle; return the fault, 0 for none."""
         fault: int = self._cycle(self._state)
         return fault
 
     def check(self) -> int:
-        """-1 where the state may be gone on from, else what is wrong with it."""
+        """Return -1 where a cycle may begin with the state, else the number of the error."""
         at: int = self._check(self._state)
         return at
 
     def values(self) -> Values:
-        """All leaves, then the trace."""
+        """Return all leaves, then the trace."""
         values: Values = self._get(self._state)
         return values
 
@@ -125,7 +125,7 @@ _BUILT: dict[bytes, Library] = {}
 
 
 def build(generated: Path, signs: Sequence[Signature]) -> Library:
-    """Compiles the generated C, once for the same text.
+    """Compile the generated C, once for the same text.
 
     Raises:
         NotBuilt: There is no compiler, or it refused.
@@ -159,7 +159,7 @@ def compiled(library: Path, *args: str) -> None:
 
 
 def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
-    """The program's files, all in the generated folder: nothing else is compiled or loaded.
+    """Return the program's files, all in the generated folder: nothing else is compiled or loaded.
 
     Raises:
         NotBuilt: A name or a link leads elsewhere.
@@ -181,10 +181,10 @@ def _built(generated: Path, signs: Sequence[Signature], layout: str) -> Library:
 
 
 def _loaded(library: Path) -> Library:
-    """The library; it stays mapped when its folder is gone.
+    """Load the library; it stays mapped when its folder is gone.
 
     Raises:
-        NotBuilt: It calls what nobody defines.
+        NotBuilt: It calls a function that is not defined.
     """
     try:
         return Library(ctypes.CDLL(str(library)))
@@ -196,7 +196,7 @@ def _loaded(library: Path) -> Library:
 
 
 def _layout(sign: Signature) -> str:
-    """Return C that has the compiler say where each leaf lies in the program's struct."""
+    """Return C that makes the compiler report the place of each leaf in the program's struct."""
     p, kind = sign.program, sign.struct_name
     places = [
         f"(unsigned)offsetof({kind}, {place})"
@@ -231,17 +231,17 @@ class CExecutor:
         self._parts: dict[tuple[int, int], struct.Struct] = {}
 
     def cycle(self) -> int:
-        """Run one cycle; the fault, 0 for none."""
+        """Run one cycle; return the fault, 0 for none."""
         fault: int = self._cycle(self._address)
         return fault
 
     def check(self) -> int:
-        """-1 where the state may be gone on from, else what is wrong with it."""
+        """Return -1 where a cycle may begin with the state, else the number of the error."""
         at: int = self._check(self._address)
         return at
 
     def write(self, name: str, value: ctypes.Array[ctypes.c_uint64] | ctypes.c_uint32) -> None:
-        """Sets a variable of the library, where it has one of that name."""
+        """Set a variable of the library, where it has one of that name."""
         try:
             there = type(value).in_dll(self._library.handle, name)
         except ValueError:
@@ -249,7 +249,7 @@ class CExecutor:
         ctypes.memmove(ctypes.byref(there), ctypes.byref(value), ctypes.sizeof(value))
 
     def values(self) -> Values:
-        """All leaves, then the trace."""
+        """Return all leaves, then the trace."""
         values = self._whole.unpack(self._memory)
         return values if self._order is None else tuple(values[at] for at in self._order)
 

@@ -21,12 +21,12 @@ class Switched(Protocol):
         ...
 
     def switch(self, fault: str, *, on: bool) -> None:
-        """Switches a fault on or off."""
+        """Switch a fault on or off."""
         ...
 
 
 class UnknownFault(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """No plant has such a fault; says which there are."""
+    """A fault that no plant has; lists those that there are."""
 
     code = Code.BAD_PLANT
 
@@ -41,17 +41,17 @@ class UnknownFault(CodedError):  # noqa: N818  # what happened, not an error of 
 
 
 def faults_of(outside: Iterable[object]) -> tuple[str, ...]:
-    """The names of all faults of what stands outside."""
+    """Return the names of all faults of the parts outside."""
     return tuple(
         dict.fromkeys(name for part in outside if isinstance(part, Switched) for name in part.faults)
     )
 
 
 def switch(outside: Iterable[object], fault: str, *, on: bool) -> None:
-    """Switches a fault on or off, in every plant that has it.
+    """Switch a fault on or off, in every plant that has it.
 
     Raises:
-        UnknownFault: None has.
+        UnknownFault: No plant has it.
     """
     parts = tuple(outside)
     having = [part for part in parts if isinstance(part, Switched) and fault in part.faults]

@@ -19,7 +19,7 @@ Query = Callable[..., Values]
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """A buffer, and where its values go."""
+    """A buffer, and the place where its values go."""
 
     buffer: str
     first: int
@@ -29,7 +29,7 @@ class Take:
 
 @dataclass(frozen=True, slots=True)
 class Give:
-    """A buffer, and which leaves it carries."""
+    """A buffer, and the leaves that it carries."""
 
     buffer: str
     first: int
@@ -38,7 +38,7 @@ class Give:
 
 @dataclass(frozen=True, slots=True)
 class Fill:
-    """A question to the database, where its answer goes, and the leaves that it is about."""
+    """A query to the database, the place of its answer, and the leaves that are its keys."""
 
     query: Query
     first: int
@@ -47,7 +47,7 @@ class Fill:
 
 
 def misfit(form: str, values: Values) -> str:
-    """Say why these are no values of leaves of a form; empty where they are. Whoever gives them may give anything."""
+    """Return the reason why values do not fit leaves of a form; empty where they do. The values may be anything."""
     try:
         struct.pack(form, *values)
     except (struct.error, OverflowError, TypeError, ValueError) as error:
@@ -119,11 +119,11 @@ class RunningLevel:
     _asked: dict[int, list[Value]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Reads the initial state."""
+        """Read the initial state."""
         self.values = self.initial = self.executor.values()
 
     def take(self, buffers: Buffers) -> None:
-        """Copies the latest value of every input buffer, then has the database fill what depends on them.
+        """Copy the latest value of every input buffer, then let the database fill the leaves that depend on them.
 
         Raises:
             StateTableError: What somebody outside published, or the database answered, are no values of these leaves.
@@ -159,12 +159,12 @@ class RunningLevel:
         return fault
 
     def give(self, buffers: Buffers) -> None:
-        """Publishes every output buffer."""
+        """Publish every output buffer."""
         for give in self.gives:
             buffers.publish(give.buffer, self.values[give.first : give.end])
 
     def restore(self, values: Values) -> None:
-        """Go on from a state that `values` held, as if nothing had happened since.
+        """Continue from a state that `values` held, as if nothing had happened since.
 
         Raises:
             BadState: The state is none that a cycle may begin with; the level has kept its own.
@@ -173,7 +173,7 @@ class RunningLevel:
         self._restored()
 
     def put_back(self, values: Values) -> None:
-        """Go on from a state that this level had, or that was checked already."""
+        """Continue from a state that this level had, or that was checked already."""
         self.executor.put(0, values[: len(self.sign.leaves)])
         self._restored()
 
@@ -183,25 +183,25 @@ class RunningLevel:
         self._asked.clear()
 
     def value(self, name: str) -> Value:
-        """A leaf of the last cycle.
+        """Return a leaf of the last cycle.
 
         Raises:
-            KeyError: There is none of that name.
+            KeyError: There is no leaf of that name.
         """
         return self.values[self.sign.index[name]]
 
     def shown(self, name: str) -> str:
-        """The same, in the table's words."""
+        """Return a leaf of the last cycle, in the table's words."""
         return self.sign.leaves[self.sign.index[name]].shown(self.value(name))
 
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
-        """Table and line of each that the last cycle ran, in order; where it was ended, of the last that was tried, with no line."""
+        """Table and line of all that the last cycle ran, in order; if it was ended, the table tried last is there without a line."""
         return (*self.sign.lines_before(self.level, self.values), (self.table, self.line))
 
     @property
     def ran(self) -> str:
-        """The same in words: `table `a`, line `x`; table `b`, line `y``."""
+        """The lines of the last cycle in words: `table `a`, line `x`; table `b`, line `y``."""
         return "; ".join(f"table `{table}`, line `{line}`" for table, line in self.lines)
 
     @property
@@ -211,7 +211,7 @@ class RunningLevel:
 
     @property
     def fault_text(self) -> str:
-        """What stopped the last cycle, in words, with what its table saw where that is known."""
+        """The fault of the last cycle in words, with the inputs of its table where they are known."""
         saw = self.sign.witness(self.table, self.values)
         return self.sign.fault_text(self.values) + (f"; it saw {saw}" if saw else "")
 
@@ -222,7 +222,7 @@ class RunningLevel:
 
     @property
     def fault(self) -> int:
-        """What stopped the last cycle; 0 for nothing."""
+        """The fault of the last cycle; 0 for none."""
         return int(self.values[len(self.sign.leaves) + 1])
 
 
@@ -233,7 +233,7 @@ def running_level(
     executor: Executor,
     queries: Mapping[str, Query],
 ) -> RunningLevel:
-    """A level wired as the description says.
+    """Wire a level as the description says.
 
     Raises:
         BadDescription: A buffer or a feed names what the program does not have, or what does not fit.

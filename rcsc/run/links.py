@@ -17,7 +17,7 @@ from rcsc.run.description import BadDescription, Description
 
 
 def check_links(system: Description, programs: Mapping[str, Program]) -> None:
-    """Check every pair of levels that both declare whom they serve and command.
+    """Check every pair of levels that both declare their link.
 
     Raises:
         BadDescription: Two declarations of one link differ.
@@ -49,7 +49,7 @@ def _pairs(
 
 
 def _differences(upper: tuple[str, Link], lower: tuple[str, Link]) -> Iterator[Diagnostic]:
-    """Yield the first difference of two declarations, at the subordinate's: what follows may come of it."""
+    """Yield the first difference of two declarations, at the subordinate's: later ones may follow from it."""
     (superior, theirs), (subordinate, mine) = upper, lower
     their = {part.what: part for part in theirs.parts}
     own = {part.what: part for part in mine.parts}

@@ -81,7 +81,7 @@ class Leaf:
 
     @property
     def part(self) -> Part:
-        """What its name may mean when the program starts anew."""
+        """The leaf as `rcsc.lang.restart` sees it: its name may tell how it starts anew."""
         whole = (
             None
             if self.members or self.c_type in {"bool", *REALS}
@@ -90,7 +90,7 @@ class Leaf:
         return Part(self.kind == "output", self.members, whole)
 
     def shown(self, value: Value) -> str:
-        """The value in the table's words."""
+        """Return the value in the table's words."""
         if self.members:
             return self.members[int(value)] if 0 <= value < len(self.members) else f"{int(value)}?"
         if self.c_type == "float":
@@ -98,14 +98,14 @@ class Leaf:
         return ("false", "true")[bool(value)] if self.c_type == "bool" else repr(value)
 
     def held(self, value: float) -> float:
-        """A number with a fraction as the variable's C type holds it: of a single, rounded to it."""
+        """Return a real number as the variable's C type holds it: a single is rounded."""
         return single(value) if self.c_type == "float" else value
 
     def read(self, text: str) -> Value:
-        """The value that a text means.
+        """Read the value of a text.
 
         Raises:
-            ValueError: It is none of this leaf's.
+            ValueError: The text is no value of this leaf.
         """
         if self.members:
             return self.members.index(text)
@@ -118,13 +118,13 @@ class Leaf:
 
 
 def number_word(leaf: Leaf) -> str:
-    """The language's word for the type of a number."""
+    """Return the language's word for the type of a number."""
     return {"double": "real", "float": "single"}.get(leaf.c_type, "int")
 
 
 @dataclass(frozen=True, slots=True)
 class StageSign:
-    """What runs before the last table of a cycle: one table, or one by a leaf.
+    """The tables that run before the last one of a cycle: one table, or one by a leaf.
 
     Attributes:
         kept: By table the leaf that holds its line: 0 for none, else one more than its position.
@@ -175,7 +175,7 @@ class Unset:
 
 @dataclass(frozen=True, slots=True)
 class Serves:
-    """Whom a program's level serves, as it declares it.
+    """The superior that a program's level serves, as it declares it.
 
     Attributes:
         order: The record of orders, and `report` that of reports.
@@ -192,7 +192,7 @@ class Serves:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A program from outside.
+    """A program as seen from outside.
 
     Attributes:
         monitored: Assumptions that the executors check.
@@ -229,7 +229,7 @@ class Signature:
 
     @property
     def trace_format(self) -> str:
-        """The trace's members as `struct` calls them, in a log."""
+        """The format of the trace's members for `struct`, in a log."""
         return "i" * len(TRACE) + "Q" * len(self.failed)
 
     @property
@@ -238,7 +238,7 @@ class Signature:
         return "i" * len(TRACE) + ("I" if len(self.monitored) <= FEW_MONITORED else "Q") * len(self.failed)
 
     def failures(self, values: Values) -> tuple[str, ...]:
-        """The monitored assumptions that failed in the cycle that left these values."""
+        """Return the monitored assumptions that failed in the cycle that left these values."""
         words = [int(word) for word in values[len(self.leaves) + len(TRACE) :]]
         return tuple(name for at, name in enumerate(self.monitored) if words[at // 64] >> at % 64 & 1)
 
@@ -253,12 +253,12 @@ class Signature:
         return "<" + "".join("B" if code == "?" else code for code in types)
 
     def variables(self, kind: str) -> tuple[str, ...]:
-        """The declared variables of a kind, `input` or `output`, in order."""
+        """Return the declared variables of a kind, `input` or `output`, in order."""
         names = (re.split(r"[.\[]", leaf.name, maxsplit=1)[0] for leaf in self.leaves if leaf.kind == kind)
         return tuple(dict.fromkeys(names))
 
     def record(self, name: str) -> range:
-        """Positions of the leaves of a variable: a record's or array's are next to each other; the pending value of one is not its part.
+        """Return the positions of a variable's leaves, which are next to each other; the pending value of a variable is not part of it.
 
         Raises:
             KeyError: There is no such variable.
@@ -286,7 +286,7 @@ class Signature:
         raise BadDescription(f"program `{self.program}` has no level `{name}`")
 
     def table_of(self, level: LevelSign, values: Values) -> str:
-        """The table that the level ran in the cycle that left these values; of several the last, or the one that ended the cycle."""
+        """Return the table that the level ran in the cycle that left these values; of several the last, or the one that ended the cycle."""
         if level.stages and int(values[len(self.leaves) + 1]) in _ENDED_BY_A_TABLE:
             names = (self._chosen(stage, values) for stage in level.stages)
             ended = (
@@ -305,7 +305,7 @@ class Signature:
         return lines[at] if 0 <= at < len(lines) else ""
 
     def lines_before(self, level: LevelSign, values: Values) -> tuple[tuple[str, str], ...]:
-        """Table and line of each that ran before that one in the cycle, in order."""
+        """Return table and line of each that ran before that one in the cycle, in order."""
         if not self.begun(values):
             return ()
         ran = (
@@ -316,7 +316,7 @@ class Signature:
         )
 
     def begun(self, values: Values) -> bool:
-        """Return whether the cycle that left these values did anything: it did not where an input or the state was refused."""
+        """Tell whether the cycle that left these values ran: it did not where an input or the state was refused."""
         return int(values[len(self.leaves) + 1]) not in _NOT_BEGUN
 
     def _chosen(self, choice: LevelSign | StageSign, values: Values) -> str:
@@ -326,7 +326,7 @@ class Signature:
         return int(values[self.index[stage.kept[table]]]) if table in stage.kept else 0
 
     def fault_at(self, values: Values) -> str:
-        """What the fault of a cycle is about: the leaf that was refused, or the assumption; empty for nothing."""
+        """Return the subject of a cycle's fault: the refused leaf, or the assumption; empty for none."""
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
         if fault == STOPPED:
             return self.monitored[at] if 0 <= at < len(self.monitored) else f"{at}?"
@@ -337,7 +337,7 @@ class Signature:
         return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
 
     def fault_text(self, values: Values) -> str:
-        """A fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
+        """Return a fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
         word = FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"
         about = self.fault_at(values)
@@ -348,7 +348,7 @@ class Signature:
         return f"{word}: {self.unfit(at, values)}"
 
     def witness(self, table: str, values: Values) -> str:
-        """What a table saw that ended the cycle by a fault: `width` = 9, `new` = true; empty for other faults, and where nobody knows."""
+        """Return the inputs of a table that ended the cycle by a fault: `width` = 9, `new` = true; empty for other faults."""
         if int(values[len(self.leaves) + 1]) not in _ENDED_BY_A_TABLE:
             return ""
         seen = ((name, self.index[name]) for name in self.sees.get(table, ()) if name in self.index)
@@ -359,7 +359,7 @@ class Signature:
         return self.invariants[at] if at < len(self.invariants) else f"{at}?"
 
     def unfit(self, at: int, values: Values) -> str:
-        """What `check` found wrong with a state, in words: `width` = 300, or the invariant that does not hold."""
+        """Return the error that `check` found in a state, in words: `width` = 300, or the invariant that does not hold."""
         if at == len(self.leaves) + len(self.invariants):
             return "it is of other tables"
         if at >= len(self.leaves):
@@ -368,7 +368,7 @@ class Signature:
 
 
 def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
-    """Return what was generated of a program: symbol file, C, header, Python; all in the generated folder.
+    """Return the generated files of a program: symbol file, C, header, Python; all in the generated folder.
 
     The symbol file bears the program's name; the others one that no library keeps, as the symbol file says.
 
@@ -387,10 +387,10 @@ def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
 
 
 def sources_of(generated: Path, word: str) -> tuple[Path, Path, Path]:
-    """The C, the header and the Python that bear a program's word, in the generated folder.
+    """Return the C, the header and the Python that bear a program's word, in the generated folder.
 
     Raises:
-        BadName: It is none, or a link leads out of the folder.
+        BadName: The word is no name, or a link leads out of the folder.
     """
     name = identifier(word, "program")
     source, header = (inside(generated, "c", f"{name}{ending}") for ending in (".c", ".h"))
@@ -416,7 +416,7 @@ def _signature(symbols: str) -> Signature:
 
 
 def signature_of(symbols: CheckedFields) -> Signature:
-    """Return the signature that a symbol file, or a log's copy of one, holds.
+    """Read the signature in a symbol file, or in a log's copy of one.
 
     The functions it names are the program's own: their names begin with its name.
 
@@ -455,7 +455,7 @@ def signature_of(symbols: CheckedFields) -> Signature:
 
 
 def _unset(symbols: CheckedFields, index: Mapping[str, int]) -> tuple[Unset, ...]:
-    """Which numbers nobody has set at first; what is said of a leaf that is not there is left out."""
+    """Return the numbers that nobody has set at first; entries for a missing leaf are left out."""
     if "unset" not in symbols.value:
         return ()
     return tuple(_unset_together(entry, index) for entry in symbols.each("unset", len(index)))
@@ -469,7 +469,7 @@ def _unset_together(entry: CheckedFields, index: Mapping[str, int]) -> Unset:
 
 
 def _serves(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> Serves | None:
-    """Whom the level serves: in a symbol file among its roles, in a log by itself; None where nothing is declared.
+    """Read the superior that the level serves: in a symbol file among its roles, in a log by itself; None where none is declared.
 
     Raises:
         Malformed: The level has no such records, or no such members.
@@ -488,10 +488,10 @@ def _serves(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> Serves | None:
 
 
 def _restart(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> dict[str, Adopted]:
-    """What each leaf adopts that starts other than initially.
+    """Read the value that each leaf adopts, for leaves that do not start with their initial values.
 
     Raises:
-        Malformed: There is no such leaf, or one does not fit what it adopts.
+        Malformed: A leaf does not exist, or does not fit the value that it adopts.
     """
     parts = {leaf.name: leaf.part for leaf in leaves}
     if "restart" not in symbols.value:
@@ -507,7 +507,7 @@ def _restart(symbols: CheckedFields, leaves: tuple[Leaf, ...]) -> dict[str, Adop
 
 
 def restart_written(sign: Signature) -> list[dict[str, object]] | None:
-    """Return what each leaf adopts, as a symbol file has it; None where the names of the leaves say it."""
+    """Return the adopted values as a symbol file has them; None where they follow from the names of the leaves."""
     adopted = {sign.leaves[at].name: adopts for at, adopts in sign.restart.items()}
     if adopted == by_names({leaf.name: leaf.part for leaf in sign.leaves}):
         return None
@@ -527,10 +527,10 @@ def _entry(adopts: Adopted) -> dict[str, object]:
 
 
 def _adopted(entry: CheckedFields, leaf: Leaf, leaves: Mapping[str, Leaf]) -> Adopted:
-    """Read what one leaf adopts.
+    """Read the value that one leaf adopts.
 
     Raises:
-        Malformed: It is no value of the leaf, or there is no such other leaf, or it is of another type.
+        Malformed: The value is none of the leaf, or the other leaf does not exist or has another type.
     """
     for word, form in (("same_as", SameAs), ("after", After)):
         if word in entry.value:
@@ -557,7 +557,7 @@ def _adopted(entry: CheckedFields, leaf: Leaf, leaves: Mapping[str, Leaf]) -> Ad
 
 
 def _own(name: str, begins: str, rest: str) -> str:
-    """A name in C that is the program's own, not one of a library's."""
+    """Return a name in C if it is the program's own; refuse one that a library may have."""
     if not (name.startswith(begins) if rest else name == begins):
         raise Malformed(f"{shown(name)} is not `{begins}{rest}`")
     return name
@@ -591,7 +591,7 @@ def _leaf(entry: CheckedFields) -> Leaf:
 
 
 def _fits(c_type: str, value: object) -> bool:
-    """Return whether a value is of the type, not an equal one of another type."""
+    """Tell whether a value is of the type, not an equal one of another type."""
     if type(value) is not {"bool": bool, "double": float, "float": float}.get(c_type, int):
         return False
     try:
@@ -649,7 +649,7 @@ def _stage(entry: CheckedFields, index: Mapping[str, int]) -> StageSign:
 
 
 def _choice(entry: CheckedFields, index: Mapping[str, int]) -> tuple[str, str, dict[int, str]]:
-    """The table that runs, or the leaf that chooses one, and each table by its value."""
+    """Return the table that runs, or the leaf that chooses one, and each table by its value."""
     by, tables = entry.text("by", ""), {}
     if "tables" in entry.value:
         named = entry.table("tables")

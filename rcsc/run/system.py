@@ -22,16 +22,16 @@ Kind = Literal["c", "python"]
 
 
 class Outside(Protocol):
-    """What stands outside the levels: a robot, a hand, a camera, a workstation."""
+    """A part outside the levels: a robot, a hand, a camera, a workstation."""
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
-        """Look at the buffers as the tick before left them; what it publishes."""
+        """Read the buffers as the tick before left them; return the values to publish."""
         ...
 
 
 @dataclass(slots=True)
 class System:
-    """Levels from the top down, what stands outside, and the buffers between.
+    """Levels from the top down, the parts outside, and the buffers between.
 
     Attributes:
         tick: Ticks done so far.
@@ -50,7 +50,7 @@ class System:
     forms: Mapping[str, str] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Finds what the buffers with a level at an end can hold."""
+        """Find the formats of the buffers with a level at an end."""
         taken = {take.buffer: take.form for level in self.levels for take in level.takes}
         self.forms = taken | {
             give.buffer: level.sign.form(range(give.first, give.end))
@@ -59,7 +59,7 @@ class System:
         }
 
     def step(self) -> None:
-        """One control tick.
+        """Run one control tick.
 
         Raises:
             StateTableError: A level was refused an input, no line or several matched, or what stands outside published no such values.
@@ -104,15 +104,15 @@ class System:
             written: The buffers as they were written, where readers may see something older; None where they do not.
 
         Raises:
-            KeyError: There is none of that name.
+            KeyError: There is no level of that name.
         """
         self.restarts.append(restart(self.level(name), self.buffers, checkpoint, written))
 
     def level(self, name: str) -> RunningLevel:
-        """A level by its name.
+        """Return a level by its name.
 
         Raises:
-            KeyError: There is none.
+            KeyError: There is no level of that name.
         """
         return next((level for level in self.levels if level.name == name), None) or _missing(name)
 
@@ -126,7 +126,7 @@ def _message(level: RunningLevel, tick: int) -> str:
 
 
 def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signature]:
-    """The signature of each level's program, by the level's name.
+    """Read the signature of each level's program, by the level's name.
 
     Args:
         system: The description.
@@ -155,10 +155,10 @@ def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signat
 
 
 def check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
-    """Check what the description says of levels and variables against their programs.
+    """Check the description's levels and variables against their programs.
 
     Raises:
-        BadDescription: Something is not; all that is not is told at once.
+        BadDescription: Something does not fit; all misfits are reported at once.
     """
     page = system.review()
     for at, spec in enumerate(system.levels):
@@ -203,7 +203,7 @@ def check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
 def _check_variable(
     page: Document, path: KeyPath, sign: Signature, variable: str, kind: str = "", *, scalar: bool = False
 ) -> None:
-    """Note where the program has no such variable, or not of that kind, or not one scalar where one is wanted."""
+    """Note a variable that the program lacks, that is of another kind, or that is no scalar where one is wanted."""
     try:
         leaves = [sign.leaves[at] for at in sign.record(variable)]
     except KeyError:
@@ -217,7 +217,7 @@ def _check_variable(
 
 
 def _check_ends(page: Document, system: Description, signs: Mapping[str, Signature]) -> None:
-    """Note buffers between levels whose two ends hold other things."""
+    """Note buffers between levels whose two ends have different types."""
     for wire in system.wires:
         ends = []
         for end in (wire.source, wire.target):
@@ -232,10 +232,10 @@ def _check_ends(page: Document, system: Description, signs: Mapping[str, Signatu
 
 
 def check_answered(system: Description, queries: Mapping[str, Query]) -> None:
-    """Check that every question of a feed has somebody who answers it.
+    """Check that every query of a feed has an answer.
 
     Raises:
-        BadDescription: One has not.
+        BadDescription: A query has none.
     """
     page = system.review()
     for at, spec in enumerate(system.levels):
@@ -253,7 +253,7 @@ def check_answered(system: Description, queries: Mapping[str, Query]) -> None:
 
 
 def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -> dict[str, Executor]:
-    """An executor for each level.
+    """Build an executor for each level.
 
     Raises:
         BadDescription: A program has no such level.
@@ -265,7 +265,7 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
 def several_executors(
     system: Description, signs: Mapping[str, Signature], kind: Kind
 ) -> Callable[[], dict[str, Executor]]:
-    """Return what makes an executor for each level, others at each call, of C that is read and built once.
+    """Return a function that makes an executor for each level, new ones at each call, of C that is read and built once.
 
     Raises:
         BadDescription: A program has no such level.
@@ -283,7 +283,7 @@ def several_executors(
 def assemble(
     system: Description, kind: Kind, queries: Mapping[str, Query], outside: Iterable[Outside] = ()
 ) -> System:
-    """The system, ready for its first tick.
+    """Assemble the system, ready for its first tick.
 
     Raises:
         BadDescription: It does not fit together, or its executors are made of tables that are not proved.

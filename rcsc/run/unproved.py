@@ -13,14 +13,14 @@ from rcsc.run.signature import generated_files
 
 
 class UnprovedExecutors(BadDescription):
-    """A generated file bears the mark; says which."""
+    """Generated files that bear the mark of unproved tables; lists them."""
 
     code = Code.EXECUTORS_NOT_PROVED
     helps = ("mend the tables, then `rcsc compile`",)
 
 
 def marked(system: Description) -> tuple[Path, ...]:
-    """The generated files of the system's programs that bear the mark, wherever in their text."""
+    """Return the generated files of the system's programs that bear the mark, wherever in their text."""
     mark = UNPROVED.encode()
     programs = dict.fromkeys(spec.program for spec in system.levels)
     files = (path for name in programs for path in generated_files(system.generated, name))
@@ -28,7 +28,7 @@ def marked(system: Description) -> tuple[Path, ...]:
 
 
 def refuse_unproved(system: Description) -> None:
-    """Stops before anything moves.
+    """Refuse unproved executors before anything moves.
 
     Raises:
         UnprovedExecutors: A generated file bears the mark.

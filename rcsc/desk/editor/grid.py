@@ -91,7 +91,7 @@ def _told(kind: Type | None) -> tuple[str, str]:
 
 
 def type_text(kind: Type) -> str:
-    """A type as it would be declared, without its unit.
+    """Return a type as it would be declared, without its unit.
 
     >>> type_text(Int(0, 100)), type_text(Array(3, Bool()))
     ('int 0 .. 100', 'array[3] of bool')
@@ -118,7 +118,7 @@ def _row(
     shares: Mapping[str, tuple[int, int]],
     areas: Callable[[Cell], tuple[Area, ...]],
 ) -> GridRow:
-    """A line over the parts of its table; cells that are missing are empty, and stand at the end of the row."""
+    """Return a line over the parts of its table; missing cells are empty, and stand at the end of the row."""
     found = [None if group is None else joined_cells(group) for group in groups]
     first = groups[0]
     assert first is not None
@@ -148,7 +148,7 @@ def _as_many(cells: Sequence[Cell], count: int, end: Cell) -> list[Cell]:
 
 
 def shares_of(program: Program, table: Table) -> dict[str, tuple[int, int]]:
-    """How many inputs each line matches, and of how many, by name; DEFAULT where no two lines overlap; none where they are not counted."""
+    """Return how many inputs each line matches, and of how many, by name; DEFAULT where no two lines overlap; {} where none are counted."""
     words = words_of(program, table)
     if words is None:
         return {}

@@ -37,7 +37,7 @@ Act: TypeAlias = Callable[[str, int], Moved | None]
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """What stands between two bars of a row: from start to end, its text from `first` to `past`.
+    """The text between two bars of a row: from start to end, trimmed from `first` to `past`.
 
     Attributes:
         action: Whether it stands after `||`.
@@ -53,12 +53,12 @@ class Region:
 
     @property
     def length(self) -> int:
-        """How long its text is."""
+        """Length of the trimmed text."""
         return self.past - self.first
 
 
 def regions(row: RowText) -> tuple[Region, ...]:
-    """The regions of a row, without its comment."""
+    """Return the regions of a row, without its comment."""
     body = row.partition("#")[0].rstrip()
     found: list[Region] = []
     at, action = 1, False
@@ -79,7 +79,7 @@ def regions(row: RowText) -> tuple[Region, ...]:
 
 
 def aligned(table: WrittenTable) -> list[Splice]:
-    """The splices that align the columns of a table; none touches the text of a cell."""
+    """Return the splices that align the columns of a table; none touches the text of a cell."""
     return [splice for part in table.parts for splice in _aligned(table.rows_of(part))]
 
 
@@ -107,14 +107,14 @@ def _aligned(rows: Sequence[RowText]) -> Iterator[Splice]:
 
 
 def align(text: str, offset: int) -> list[Splice]:
-    """The splices that align the table around an offset, those that change something."""
+    """Return the splices that align the table around an offset, without those that change nothing."""
     table = _table(text, offset)
     found = [] if table is None else aligned(table)
     return [(start, end, new) for start, end, new in found if text[start:end] != new]
 
 
 def keep_aligned(text: str, offset: int) -> Moved | None:
-    """Align the table around an offset, which stays at its letter; None where nothing is to be aligned."""
+    """Align the table around an offset, which stays at its letter; None if the table is aligned already."""
     splices = align(text, offset)
     if not splices:
         return None
@@ -128,7 +128,7 @@ def keep_aligned(text: str, offset: int) -> Moved | None:
 
 
 def next_cell(text: str, offset: int) -> Moved | None:
-    """Go to the next cell, in the next line after the last, in a new line after the last of all; None outside tables."""
+    """Go to the next cell; from the last of a line to the next line, from the last of the table to a new line. None outside tables."""
     here = _Here.of(text, offset)
     if here is None:
         return None
@@ -225,7 +225,7 @@ class _Here:
 
     @classmethod
     def of(cls, text: str, offset: int) -> "_Here | None":
-        """The cell; None where there is no row with one, or the table has no heading yet."""
+        """Find the cell around an offset; None where no row has one, or the table has no heading yet."""
         for number, table in enumerate(tables_of(text)):
             for at, row in enumerate(table.rows):
                 if row.start <= offset <= row.past and table.parts and table.parts[0].heading:
@@ -237,7 +237,7 @@ class _Here:
         return None
 
     def again(self, text: str) -> WrittenTable:
-        """The table in a changed text."""
+        """Return the table in a changed text."""
         return list(tables_of(text))[self.number]
 
 
@@ -250,13 +250,13 @@ def _before(table: WrittenTable, row: RowText) -> RowText:
 
 
 def _further(table: WrittenTable, splices: Sequence[Splice], past: int) -> int:
-    """How many rows were added before an offset."""
+    """Count the rows added before an offset."""
     assert table.rows
     return sum(start < past for start, _, _ in splices)
 
 
 def _cursor(row: RowText, cell: int) -> int:
-    """Where the text of a cell begins, or would."""
+    """Return the offset where the text of a cell begins, or would begin."""
     cells = regions(row)
     if not cells:
         return row.past

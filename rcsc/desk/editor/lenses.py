@@ -35,7 +35,7 @@ MOST = 40
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What a lens comes to.
+    """The result of a lens.
 
     Attributes:
         form: `text`, `mermaid` or `svg`.
@@ -47,7 +47,7 @@ class Shown:
 
 
 def table_of(reading: Reading, name: str) -> tuple[Program, Table] | str:
-    """The program and the table; why there is none."""
+    """Find the program and the table of a name; else return the reason why there is none."""
     if reading.program is None:
         return (
             f"the program is not in order: {reading.wrong[0].message}"
@@ -59,7 +59,7 @@ def table_of(reading: Reading, name: str) -> tuple[Program, Table] | str:
 
 
 def proved_anew(reading: Reading, name: str, options: Options) -> Shown:
-    """A table proved with nothing remembered, and what backs the verdict."""
+    """Prove a table with nothing remembered, and show the verdict with what supports it."""
     found = table_of(reading, name)
     if isinstance(found, str):
         return Shown(f"table {name}", "text", found)
@@ -82,7 +82,7 @@ def proved_anew(reading: Reading, name: str, options: Options) -> Shown:
 
 
 def drawn(reading: Reading, name: str, options: Options, form: str = "") -> Shown:
-    """The state graph of a table: a drawing, or Mermaid where nothing can lay one out."""
+    """Draw the state graph of a table; write it as Mermaid where no layout can be made."""
     found = table_of(reading, name)
     if isinstance(found, str):
         return Shown(f"graph of {name}", "text", found)
@@ -99,7 +99,7 @@ def drawn(reading: Reading, name: str, options: Options, form: str = "") -> Show
 
 
 def witness_run(checked: Checked, name: str, which: int = 0) -> Shown:
-    """A witness of a table's findings run by the interpreter: which lines match, what each would do, and why no other matches."""
+    """Run a witness of a table's findings in the interpreter: show which lines match, what each would do, and why no other matches."""
     title = f"witness of {name}"
     found = table_of(checked.reading, name)
     if isinstance(found, str):
@@ -114,7 +114,7 @@ def witness_run(checked: Checked, name: str, which: int = 0) -> Shown:
 
 
 def run_at(program: Program, table: Table, values: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield what the interpreter says of one look of a table: what comes of it, and of each line.
+    """Yield what the interpreter says of one cycle of a table: its outcome, and that of each line.
 
     Args:
         program: The table's.
@@ -161,7 +161,7 @@ def _does(program: Program, line: Line, now: Mapping[str, Value], kinds: Mapping
 
 
 def _not_called(procedure: Procedure, _: list[Value]) -> tuple[Value, ...]:
-    """Refuse: somebody's own program is not run to look at a table."""
+    """Refuse the call: a user's own program is not run to look at a table."""
     raise ExternError(f"`{procedure.name}` is an extern procedure, and is not called")
 
 
@@ -176,7 +176,7 @@ def _first_that_fails(table: Table, line: Line, now: Mapping[str, Value]) -> str
 
 
 def mended(workspace: Workspace, file: str) -> tuple[str, int]:
-    """The text of a file with proved repairs made until none is left, and how many; errors alone are mended.
+    """Make proved repairs of errors until none is left; return the text and the number of repairs.
 
     Args:
         workspace: What is open; it stays as it is.

@@ -55,7 +55,7 @@ class Memo:
     _program: Program | None = None
 
     def verdict(self, program: Program, table: Table, make: Callable[[], TableVerdict]) -> TableVerdict:
-        """The verdict on an equal table, else a new one.
+        """Return the verdict on an equal table, else make a new one.
 
         Raises:
             OutdatedError: Nobody waits for it.
@@ -71,7 +71,7 @@ class Memo:
     def told(
         self, verdict: TableVerdict, unproved: frozenset[str], make: Callable[[], list[Diagnostic]]
     ) -> list[Diagnostic]:
-        """The diagnostics of an equal verdict on a table of the same shape, moved to where it stands now; else new ones.
+        """Return the diagnostics of an equal verdict on a table of the same shape, moved to where it stands now; else make new ones.
 
         Raises:
             OutdatedError: Nobody waits for them.
@@ -89,7 +89,7 @@ class Memo:
     def outcome(
         self, program: Program, table: Table, proposal: Proposal, make: Callable[[], Outcome]
     ) -> Outcome:
-        """What came of a proposal for an equal table, else what comes of it now.
+        """Return the outcome of a proposal for an equal table, else try it now.
 
         Raises:
             OutdatedError: Nobody waits for it.
@@ -116,16 +116,16 @@ class Memo:
         return made
 
     def asked(self) -> None:
-        """Go on only if somebody waits; what was proved since nobody did may be of questions left open, and is not kept.
+        """Raise if nobody waits any more: a proof made since then may have open questions, and is not kept.
 
         Raises:
-            OutdatedError: Nobody does.
+            OutdatedError: Nobody waits any more.
         """
         if not self.go_on():
             raise OutdatedError
 
     def _of(self, program: Program) -> _Versions:
-        """What is known in a program that is equal but for its tables."""
+        """Return the versions kept for a program that is equal but for its tables."""
         if program is self._program:
             return self._versions[0]
         rest = replace(program, name="", tables=(), own_tables=())
@@ -136,7 +136,7 @@ class Memo:
 
 
 def _shape(table: Table) -> tuple[object, ...]:
-    """Where the parts of a table stand, seen from its name, and what its diagnostics say beside its verdict."""
+    """Return the places of a table's parts, seen from its name, and what its diagnostics say beside its verdict."""
     base = table.span.start
     default = (
         None if table.default is None else (table.default.span.start - base, table.default.span.end - base)

@@ -14,14 +14,14 @@ _END = re.compile(r"\r\n|\n|\r")
 
 
 class Units(StrEnum):
-    """What columns count; the words are those of the protocol."""
+    """The unit of columns; the words are those of the protocol."""
 
     CHARACTERS = "utf-32"
     UTF_16 = "utf-16"
     UTF_8 = "utf-8"
 
     def of(self, text: str) -> int:
-        r"""How many units a text has.
+        r"""Return the length of a text in units.
 
         >>> [units.of("aé\U0001f916") for units in Units]
         [3, 4, 7]
@@ -46,13 +46,13 @@ class Place:
     column: int
 
     def __str__(self) -> str:
-        """As people count: both from 1."""
+        """Return line and column as people count them: both from 1."""
         return f"{self.line + 1}:{self.column + 1}"
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Area:
-    """What lies between two places of a file."""
+    """The text between two places of a file."""
 
     file: str
     start: Place
@@ -78,20 +78,20 @@ class Lines:
         object.__setattr__(self, "starts", (0, *(end.end() for end in _END.finditer(self.text))))
 
     def line(self, number: int) -> str:
-        """The text of a line without its end; empty past the last."""
+        """Return the text of a line without its end; empty past the last."""
         if not 0 <= number < len(self.starts):
             return ""
         past = self.starts[number + 1] if number + 1 < len(self.starts) else len(self.text)
         return self.text[self.starts[number] : past].rstrip("\r\n")
 
     def place(self, offset: int, units: Units = Units.CHARACTERS) -> Place:
-        """The place before the character at an offset; the end of the text for one past it."""
+        """Return the place before the character at an offset; the end of the text for an offset past it."""
         offset = max(0, min(offset, len(self.text)))
         line = bisect_right(self.starts, offset) - 1
         return Place(line, units.of(self.text[self.starts[line] : offset]))
 
     def offset(self, place: Place, units: Units = Units.CHARACTERS) -> int:
-        r"""The offset of a place; of one past the end of its line that end, as editors have it.
+        r"""Return the offset of a place; for a place past the end of its line, that end, as editors do.
 
         >>> lines = Lines("on\r\n\U0001f916x\n")
         >>> [lines.offset(Place(*place), Units.UTF_16) for place in ((0, 9), (1, 2), (1, 3), (7, 0))]
@@ -103,15 +103,15 @@ class Lines:
         return self.starts[max(0, place.line)] + _characters(line, place.column, units)
 
     def area(self, file: str, start: int, end: int) -> Area:
-        """The area between two offsets."""
+        """Return the area between two offsets."""
         return Area(file, self.place(start), self.place(end))
 
     def shifted(self, place: Place, units: Units) -> Place:
-        """A place in characters, in other units."""
+        """Convert a place from characters to other units."""
         return Place(place.line, units.of(self.line(place.line)[: place.column]))
 
     def applied(self, edits: Sequence[Edit]) -> str:
-        """The text with these edits made; each is of the text as it is."""
+        """Return the text with these edits made; their areas are those of the present text."""
         text = self.text
         for edit in sorted(edits, key=lambda each: (each.area.start, each.area.end), reverse=True):
             text = text[: self.offset(edit.area.start)] + edit.text + text[self.offset(edit.area.end) :]
@@ -119,13 +119,13 @@ class Lines:
 
     @property
     def end(self) -> str:
-        """How its lines end: as the first one does."""
+        """The line end of the text: that of its first line."""
         first = _END.search(self.text)
         return "\n" if first is None else first[0]
 
 
 def _characters(line: str, column: int, units: Units) -> int:
-    """How many characters of a line stand before a column; one in the middle of a character is before it."""
+    """Count the characters of a line before a column; a column within a character is before it."""
     if units is Units.CHARACTERS or line.isascii():
         return max(0, min(column, len(line)))
     count = 0
@@ -137,7 +137,7 @@ def _characters(line: str, column: int, units: Units) -> int:
 
 
 def difference(file: str, before: Lines, after: str) -> tuple[Edit, ...]:
-    """The edits that make one text of another, lines that are alike left alone.
+    """Return the edits that turn one text into another, and leave equal lines alone.
 
     Only lines are compared, from both ends first: tables have thousands of them, of which few change.
     """

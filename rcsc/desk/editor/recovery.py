@@ -46,7 +46,7 @@ _NOT_END = re.compile(r"[^\r\n]")
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What is left of a program.
+    """The rest of a program, with its broken parts left out.
 
     Attributes:
         program: None where nothing that resolves is left.
@@ -82,7 +82,7 @@ class _Pieces:
         return cls(source, (0, *begins), {row.start: (row, line) for line in lines for row in line})
 
     def parts(self, offset: int) -> Iterator[Span]:
-        """Yield what can be left out around an offset so that its declaration still stands, the least first.
+        """Yield the spans around an offset that can be left out so that their declaration still stands, the smallest first.
 
         In a table the text of a cell, then its row, then all rows of its line; not the cell that names the line, for a row without
         a name goes on with the line above. In a level a line of text.
@@ -101,30 +101,30 @@ class _Pieces:
             yield Span(self.source.name, begin, len(self.source.text) if end < 0 else end)
 
     def begins(self, span: Span) -> str:
-        """The word with which a declaration begins; empty for what stands before the first."""
+        """Return the word with which a declaration begins; empty for the text before the first."""
         found = _BEGINS.match(self.source.text, span.start)
         return "" if found is None else found["word"]
 
     def around(self, offset: int) -> Span:
-        """The declaration in which an offset lies."""
+        """Return the declaration around an offset."""
         at = bisect_right(self.starts, offset) - 1
         past = self.starts[at + 1] if at + 1 < len(self.starts) else len(self.source.text)
         return Span(self.source.name, self.starts[at], past)
 
     def words(self, span: Span) -> frozenset[str]:
-        """The words of a declaration, comments left out."""
+        """Return the words of a declaration without its comments."""
         return frozenset(_WORD.findall(_COMMENT.sub("", self.source.slice(span))))
 
     def parses(self, span: Span) -> bool:
-        """Whether a declaration parses by itself."""
+        """Tell whether a declaration parses by itself."""
         return isinstance(parse(Source(span.file, self.source.slice(span))), tree.File)
 
     def uses(self, span: Span) -> bool:
-        """Whether it uses a file, which may declare anything."""
+        """Tell whether it uses a file, which may declare anything."""
         return self.begins(span) == "use"
 
     def declares(self, span: Span) -> frozenset[str]:
-        """The names that what is left out may declare: none in a part of a table."""
+        """Return the names that the left-out text may declare: none in a part of a table."""
         if span.start in self.lines or (
             not self.begins(span) and self.begins(self.around(span.start)) == "table"
         ):
@@ -136,7 +136,7 @@ class _Pieces:
 
 
 def declarations(source: Source) -> Iterator[tuple[str, str, Span, Span]]:
-    """Yield the word, the name, all of it, and the place of the name, of what a text declares, whether it parses or not."""
+    """Yield the word, the name, the whole span and the span of the name of each declaration in a text, whether it parses or not."""
     pieces = _Pieces.of(source)
     for found in _BEGINS.finditer(source.text):
         name = _named(source.text, found)
@@ -152,12 +152,12 @@ def declarations(source: Source) -> Iterator[tuple[str, str, Span, Span]]:
 
 
 def _within_a_level(found: re.Match[str]) -> bool:
-    """Whether a word `table` is that of a level, which says what it tries, and declares none."""
+    """Tell whether a word `table` belongs to a level, which names its tables with it, and declares none."""
     return found["word"] == "table" and found["name"] in {None, "by"}
 
 
 def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | None:
-    """The name of a declaration and where it stands: of `extern procedure name` the third word."""
+    """Return the name of a declaration and its place: the third word of `extern procedure name`."""
     if found["name"] is None:
         return None
     if found["word"] == "extern":
@@ -167,7 +167,7 @@ def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | Non
 
 
 def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Mapping[str, str]) -> Rest:
-    """What is left of the program of a file when what is broken is left out.
+    """Return the rest of a file's program, with the broken parts left out.
 
     Args:
         root: The file.
@@ -198,14 +198,14 @@ def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Map
 
 
 def _harmed(pieces: Mapping[str, _Pieces], out: Iterable[Span]) -> tuple[Span, ...]:
-    """The declarations of which a part is left out."""
+    """Return the declarations of which a part is left out."""
     return tuple(
         dict.fromkeys(whole for span in out if (whole := pieces[span.file].around(span.start)) != span)
     )
 
 
 def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
-    """The program, or what is wrong with it."""
+    """Return the program, or its errors."""
     if root in loaded.files:
         return resolve(root, loaded)
     files = set(closure(root, loaded))
@@ -213,7 +213,7 @@ def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
 
 
 def _piece(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collection[Span] = ()) -> Span | None:
-    """The declaration that an error is in: the one before where it parses by itself, and is only where that is noticed."""
+    """Return the declaration that an error is in: the one before, if the error's own parses by itself and only shows the error."""
     span = diagnostic.primary.span
     if span.file not in pieces:
         return None
@@ -227,7 +227,7 @@ def _piece(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collectio
 
 
 def _least(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collection[Span]) -> Span | None:
-    """What is to be left out for an error: a part of its declaration, and all of it where no part helped."""
+    """Return the span to leave out for an error: a part of its declaration, or all of it if no part helped."""
     whole, span = _piece(diagnostic, pieces, out), diagnostic.primary.span
     if whole is None or whole in out or not whole.start <= span.start < whole.end:
         return whole
@@ -237,7 +237,7 @@ def _least(diagnostic: Diagnostic, pieces: Mapping[str, _Pieces], out: Collectio
 def _of_the_rest(
     told: Iterable[Diagnostic], pieces: Mapping[str, _Pieces], out: Mapping[Span, None]
 ) -> Iterator[Diagnostic]:
-    """Yield the errors that do not come of what was left out; none before anything was: `rcsc check` says those."""
+    """Yield the errors that do not come from text left out. Yield none before any was: `rcsc check` reports those."""
     if not out or any(pieces[span.file].uses(span) for span in out):
         return
     missing = frozenset[str]().union(*(pieces[span.file].declares(span) for span in out))
@@ -249,7 +249,7 @@ def _of_the_rest(
 
 
 def _blanked(pieces: Mapping[str, _Pieces], out: Iterable[Span]) -> dict[str, str]:
-    """The texts with these declarations made blank, by real path."""
+    """Return the texts with these declarations made blank, by real path."""
     texts: dict[str, str] = {}
     for span in out:
         text = texts.get(span.file, pieces[span.file].source.text)

@@ -20,7 +20,7 @@ NEVER_LOOKED_AT = Standing(State.STALE, "the program that it belongs to is not i
 
 
 def standing(report: TableReport | None, errors: Sequence[str], broken: str = "") -> Standing:
-    """The state of a table.
+    """Return the state of a table.
 
     Args:
         report: What a check of the text as it is now says of the table; None where it does not come to that.

@@ -9,7 +9,7 @@ from rcsc.desk.editor.places import Area, Edit
 
 
 class State(StrEnum):
-    """What is known of a table, in the words that every view shows."""
+    """The state of a table's proof, in the words that every view shows."""
 
     PROVED = "proved"
     ASSUMED = "rests on an assumption"
@@ -29,7 +29,7 @@ class Standing:
     why: str
 
     def __str__(self) -> str:
-        """State and reason."""
+        """Return state and reason."""
         return f"{self.state.value}: {self.why}" if self.why else self.state.value
 
 
@@ -176,7 +176,7 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What is known of a file and of all that it uses, as the texts are.
+    """The state of a file and of all that it uses, as the texts are.
 
     Attributes:
         file: The absolute path.

@@ -73,17 +73,17 @@ class Reading:
 
     @property
     def nearest(self) -> Program | None:
-        """The program, or what is left of it."""
+        """The program, or the rest of it."""
         return self.program if self.rest is None else self.rest.program
 
     @property
     def files(self) -> "Mapping[str, tree.File]":
-        """Every file that parses; of one that does not what is left of it."""
+        """Every file that parses, and the rest of each that does not."""
         return self.loaded.files if self.rest is None else {**self.loaded.files, **self.rest.loaded.files}
 
     @property
     def sources(self) -> Mapping[str, Source]:
-        """Every text, as it is."""
+        """Every text as it is."""
         return (
             self.loaded.sources if self.rest is None else {**self.rest.loaded.sources, **self.loaded.sources}
         )
@@ -136,17 +136,17 @@ class Workspace:
         self._overlay = {**self._overlay, os.path.realpath(file): blank + text.removeprefix(BOM)}
 
     def close(self, file: str) -> None:
-        """Go back to what is on disk."""
+        """Return to the text on disk."""
         gone = os.path.realpath(file)
         self._overlay = {path: text for path, text in self._overlay.items() if path != gone}
 
     @property
     def overlay(self) -> Mapping[str, str]:
-        """The texts that are open, by real path."""
+        """The open texts, by real path."""
         return self._overlay
 
     def text(self, file: str) -> str:
-        """The text of a file: as it is open, else as it is on disk; empty where there is none that can be read."""
+        """Return the text of a file: the open one, else the one on disk; empty if none can be read."""
         open_text = self._overlay.get(os.path.realpath(file))
         if open_text is not None:
             return open_text
@@ -154,7 +154,7 @@ class Workspace:
         return loaded.sources[file].text if file in loaded.sources else ""
 
     def trial(self, texts: Mapping[str, str]) -> "Workspace":
-        """Another workspace of the same texts, but for some, that knows what this one has proved.
+        """Return another workspace of the same texts, with some replaced, that shares the verdicts of this one.
 
         Args:
             texts: By path.
@@ -167,14 +167,14 @@ class Workspace:
     # --- answers ---
 
     def answered(self, path: str) -> Answer | None:
-        """The last answer to a file, if no text that it depends on has changed since; nothing is proved for it."""
+        """Return the last answer to a file, if no text that it depends on has changed since; prove nothing."""
         known, checked = self._answers.get(path), self._checked.get(path)
         if known is None or checked is None or checked.reading is not self.reading(path):
             return None
         return known[1]
 
     def check(self, file: str, go_on: Callable[[], bool] = lambda: True) -> Answer:
-        """What is known of a file and of all that it uses, as the texts are now.
+        """Check a file and all that it uses, as the texts are now.
 
         Args:
             file: Its path; answers name files by absolute paths.
@@ -190,7 +190,7 @@ class Workspace:
     def glance(
         self, file: str, go_on: Callable[[], bool] = lambda: True, since_s: float | None = None
     ) -> Answer:
-        """What can be known of a file in a moment: the answer, or one that is not final, where a question needs more steps.
+        """Check a file in a moment: return the answer, or one that is not final where a question needs more steps.
 
         Args:
             file: As for `check`.
@@ -223,7 +223,7 @@ class Workspace:
             return _answer(path, checked, final=False)
 
     def given_up(self, file: str, error: Exception) -> Answer:
-        """The answer where a bug in rcsc came in the way of one: a finding that says so, and tables that nobody has proved.
+        """Return the answer where a bug in rcsc prevented one: a finding that reports it, and unproved tables.
 
         Args:
             file: As for `check`; its text, which may be at fault, is only split into tables.
@@ -250,10 +250,10 @@ class Workspace:
 
     @contextmanager
     def _asking(self, go_on: Callable[[], bool]) -> Iterator[None]:
-        """Prove as long as somebody waits.
+        """Prove only while somebody waits.
 
         Raises:
-            OutdatedError: Nobody does any more.
+            OutdatedError: Nobody waits any more.
         """
         self.memo.go_on = go_on
         with (
@@ -267,7 +267,7 @@ class Workspace:
 
     @uncollected()
     def reading(self, path: str) -> Reading:
-        """A file read, from memory where no text that it depends on has changed; any thread may ask.
+        """Read a file, from memory if no text that it depends on has changed; any thread may ask.
 
         Args:
             path: Absolute and normal.
@@ -282,7 +282,7 @@ class Workspace:
             return reading
 
     def checked(self, path: str) -> Checked:
-        """A file checked, from memory where no text that it depends on has changed."""
+        """Check a file, from memory if no text that it depends on has changed."""
         reading = self.reading(path)
         before = self._checked.get(path)
         if before is None or before.reading is not reading:
@@ -308,7 +308,7 @@ class Workspace:
     def _proved(
         self, reading: Reading, program: Program, options: Options, harmed: Sequence[Span] = ()
     ) -> tuple[tuple[Diagnostic, ...], dict[tuple[str, str], TableReport]]:
-        """What is found in a program, and a report of each table; of a declaration that is not as it stands nothing."""
+        """Prove a program; return its findings and a report of each table, without those in declarations of which a part was left out."""
         names = [table.name for table in program.tables if not _inside(table.span, harmed)]
         verdict = prove_program(program, options, only=names, known=self.memo)
         reports = {}
@@ -322,7 +322,7 @@ class Workspace:
         return told, reports
 
     def project(self, file: str) -> tuple[str, ...]:
-        """The files that may belong with one: those of its project; without a project file those beside it alone.
+        """Return the files that may belong with one: those of its project, or without a project file those beside it alone.
 
         Args:
             file: Absolute and normal.
@@ -336,7 +336,7 @@ class Workspace:
         return tuple(dict.fromkeys((file, *map(os.path.normpath, found))))
 
     def read_all(self, files: Sequence[str], over: Mapping[str, str] | None = None) -> Loaded:
-        """Files and all that they use, as the texts are.
+        """Read files and all that they use, as the texts are.
 
         Args:
             files: Absolute.
@@ -348,7 +348,7 @@ class Workspace:
     # --- repairs ---
 
     def repairs(self, finding: Finding) -> tuple[Repair, ...]:
-        """Repairs of a finding, each made and checked: with it the finding is gone, and no other has come."""
+        """Return the repairs of a finding. Each was made and checked: with it the finding is gone, and no other has come."""
         checked = next(
             (
                 each
@@ -380,7 +380,7 @@ class Workspace:
             yield Repair(f"write `{meant}`", "", edits, clears=False, certain=False)
 
     def _outcome(self, checked: Checked, source: Source, told: Diagnostic, text: str) -> bool | None:
-        """Whether nothing is wrong with the table in a text; None where the finding is still there, or another has come."""
+        """Tell whether a text has no error in the table; return None where the finding stays, or another has come."""
         trial = self.trial({source.name: text})
         with smt.together(MOST_OF_A_REPAIR, of_all=True):
             after = trial.checked(checked.reading.path)
@@ -399,7 +399,7 @@ def _messages(checked: Checked) -> set[str]:
 
 
 def _inside(span: Span, wholes: Iterable[Span]) -> bool:
-    """Whether a place is in one of several declarations."""
+    """Tell whether a place is in one of several declarations."""
     return any(whole.file == span.file and whole.start <= span.start < whole.end for whole in wholes)
 
 
@@ -412,14 +412,13 @@ def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
 
 
 def _spent(since_s: float) -> Callable[[], bool]:
-    """Ask, in any thread, whether this one has done what a glance may do for somebody who waits since then."""
+    """Return a function that tells, in any thread, whether this one has used up a glance for somebody who waits since then."""
     clock = time.pthread_getcpuclockid(threading.get_ident())
     begun_s = time.clock_gettime(clock)
     return lambda: time.monotonic() - since_s >= GLANCE_S and time.clock_gettime(clock) - begun_s >= LEAST_S
 
 
 def _alike(before: Loaded, now: Loaded) -> bool:
-    """Whether the same was read."""
     return (before.roots, before.sources, before.diagnostics, before.uses) == (
         now.roots,
         now.sources,
@@ -429,7 +428,7 @@ def _alike(before: Loaded, now: Loaded) -> bool:
 
 
 def _names_in(loaded: Loaded, diagnostic: Diagnostic) -> set[str]:
-    """The table in whose text a finding stands."""
+    """Return the tables in whose text a finding stands: one, or none."""
     span = diagnostic.primary.span
     text = loaded.sources[span.file].text if span.file in loaded.sources else ""
     return {table.name for table in tables_of(text) if table.start <= span.start <= table.end}
@@ -447,17 +446,17 @@ class _Files:
     tables: dict[str, tuple[WrittenTable, ...]] = field(default_factory=dict)
 
     def area(self, span: Span) -> Area:
-        """The area of a span; the beginning of a file that was not read."""
+        """Return the area of a span; the beginning of a file that was not read."""
         return self.of(span.file).area(span.file, span.start, span.end)
 
     def of(self, file: str) -> Lines:
-        """A text by lines."""
+        """Return a text by lines."""
         if file not in self.lines:
             self.lines[file] = Lines(self.sources[file].text if file in self.sources else "")
         return self.lines[file]
 
     def table(self, span: Span) -> str:
-        """The table in whose text a span begins; empty for none."""
+        """Return the table in whose text a span begins; empty for none."""
         if span.file not in self.tables:
             self.tables[span.file] = tuple(tables_of(self.of(span.file).text))
         return next(
@@ -466,7 +465,7 @@ class _Files:
 
 
 def _answer(path: str, checked: Checked, *, final: bool = True) -> Answer:
-    """The answer; in one that is not final nothing is said of what was left open."""
+    """Build the answer; one that is not final leaves out the findings about open questions."""
     reading = checked.reading
     files = _Files(reading.sources)
     told = [(each, False) for each in checked.diagnostics] + [(each, True) for each in checked.meanwhile]
@@ -490,7 +489,7 @@ def _answer(path: str, checked: Checked, *, final: bool = True) -> Answer:
 
 
 def _first(error: Finding) -> str:
-    """What keeps a program from being looked at."""
+    """Return the reason why a program is not proved: its first error."""
     place = f"{os.path.basename(error.area.file)}:{error.area.start}"
     return f"the program is not in order: {error.message} ({place})"
 

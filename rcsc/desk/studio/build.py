@@ -51,11 +51,11 @@ class Build(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"build.open": self._open, "build.prove": self._prove, "build.trust": self._trust}
 
     def prove_first(self, ask: Ask, then: Callable[[], Json]) -> Json:
-        """Prove the levels together, beside them; then have something done in the lane `run`, and answer with that. From any lane."""
+        """Prove the levels together, beside them; then call `then` in the lane `run`, and answer with its result. From any lane."""
 
         def proved() -> Json:
             try:
@@ -69,11 +69,11 @@ class Build(Concern):
         return LATER
 
     def greeting(self) -> Json:
-        """What is being done, and what the last compilation found."""
+        """Return the work under way and the findings of the last compilation."""
         return self._said
 
     def begin(self) -> None:
-        """Compile, and open the system; where there are tables alone, or its code was not agreed to, say so."""
+        """Compile and open the system; report why not where there are only tables, or where nobody agreed to its code."""
         self._hub.watch(self._live.lane, self._live.held)
         if not self._path.is_file():
             self._hub.do(RUN, lambda: self._live.close_because(NO_SYSTEM))
@@ -102,7 +102,7 @@ class Build(Concern):
         self._hub.tell("build.state", self._said)
 
     def _open(self, ask: Ask) -> Json:
-        """Compile what changed, and open the system anew."""
+        """Compile whatever changed, and open the system anew."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
         if not self._agreement.given:
@@ -127,11 +127,11 @@ class Build(Concern):
         told: Callable[[str], None],
         ask: Ask | None = None,
     ) -> T:
-        """Have a process of its own do something, and say every while what it does and for how long.
+        """Run some work in a process of its own, and report regularly which work it is and how long it has taken.
 
         Raises:
             CancelledError: The question was cancelled, or the studio ends; the process is gone.
-            WorkerEndedError: It ended without an answer.
+            WorkerEndedError: The process ended without an answer.
         """
         what, function, arguments = work
         processes, begun_s = executor(1), time.monotonic()
@@ -184,7 +184,7 @@ class Build(Concern):
         return {"ok": report["ok"], "findings": report["diagnostics"]}
 
     def _prove(self, ask: Ask) -> Json:
-        """Prove the levels together; what fails is kept as logs."""
+        """Prove the levels together, and keep counterexamples as logs."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
         folder = self._path.parent / FOUND
@@ -199,7 +199,7 @@ class Build(Concern):
 
 
 def compiled(path: Path) -> dict[str, Any]:
-    """Prove and compile a system's tables; return the report as JSON. A description that is not in order is a finding, too."""
+    """Prove and compile a system's tables; return the report as JSON. An invalid description is reported in it, too."""
     try:
         return report_to_json(compile_system(path).report, "compile")
     except CodedError as error:
@@ -207,7 +207,7 @@ def compiled(path: Path) -> dict[str, Any]:
 
 
 def proved_together(path: Path) -> None:
-    """Prove a system's levels together, and keep what was found where the next that asks looks for it.
+    """Prove a system's levels together, and keep the result in the cache, where the next proof looks for it.
 
     Raises:
         Refused: The description is not in order.
@@ -218,7 +218,7 @@ def proved_together(path: Path) -> None:
 
 
 def commanded(arguments: tuple[str, ...]) -> tuple[int | None, str]:
-    """Run `rcsc` with arguments; return its status and what it said."""
+    """Run `rcsc` with arguments; return its status and its output."""
     ran = run_program([sys.executable, "-c", _COMMAND, *arguments])
     return ran.status, ran.out + ran.err
 

@@ -65,11 +65,11 @@ class Ask:
         self._stops: list[Callable[[], None]] = []
 
     def done(self, how: Callable[[], Json]) -> None:
-        """Answer a question whose handler returned `LATER`: with what `how` returns, or why it raises."""
+        """Answer a question whose handler returned `LATER`: with the result of `how`, or the reason why it raises."""
         self._finish(how)
 
     def progress(self, text: str, done: int = 0, of: int = 0) -> None:
-        """Tell the page how far it is.
+        """Report progress to the page.
 
         Args:
             text: What is being done, in words.
@@ -83,7 +83,7 @@ class Ask:
         self._told({"text": text, "done": done, "of": of})
 
     def check(self) -> None:
-        """Go on, or not.
+        """Return if the page still waits for the answer.
 
         Raises:
             CancelledError: Nobody waits for the answer.
@@ -93,9 +93,9 @@ class Ask:
 
     @contextmanager
     def proving(self, what: str) -> Iterator[None]:
-        """Inside, the solvers are this thread's, and the page is told how long it takes; once it wants no answer, nothing more is asked.
+        """Give this thread the solvers, and tell the page how long it takes; once it wants no answer, ask the solvers no more.
 
-        The answers of the solvers are `unknown` then: who uses them calls `check` before anything is kept of it.
+        The solvers then answer `unknown`: the caller calls `check` before it keeps anything that rests on their answers.
 
         Args:
             what: In words.
@@ -125,17 +125,17 @@ class Ask:
 
     @property
     def cancelled(self) -> bool:
-        """Whether nobody waits for the answer."""
+        """True once nobody waits for the answer."""
         return self._over.is_set()
 
     def on_cancel(self, stop: Callable[[], None]) -> None:
-        """Have something called when the question is cancelled; at once where it is."""
+        """Call a function when the question is cancelled; at once if it already is."""
         self._stops.append(stop)
         if self._over.is_set():
             stop()
 
     def cancel(self) -> None:
-        """Want no answer any more."""
+        """Cancel the question."""
         self._over.set()
         for stop in list(self._stops):
             stop()
@@ -180,7 +180,7 @@ class Concern:
 
 
 class Lane:
-    """One thread that does what it is given, in order of when it is due, until it is ended."""
+    """A thread that does its work in the order of when it is due, until it is ended."""
 
     def __init__(self, name: str, failed: Callable[[BaseException], None]) -> None:
         """Args: name: Of the thread; failed: Takes what a piece of work raises."""
@@ -194,7 +194,7 @@ class Lane:
         self._thread.start()
 
     def do(self, work: Callable[[], None], after_s: float = 0.0) -> None:
-        """Have something done after all that is due before.
+        """Queue work after all that is due before it.
 
         Args:
             work: Without arguments.
@@ -205,19 +205,19 @@ class Lane:
             self._changed.notify()
 
     def end(self) -> None:
-        """Begin nothing more; what is being done goes on to its end."""
+        """Begin no more work; the current one goes on to its end."""
         with self._changed:
             self._ended = True
             self._changed.notify()
 
     def ended(self, within_s: float) -> bool:
-        """Wait for the end of what is being done, at most so many seconds; whether it has come."""
+        """Wait at most so many seconds for the current work to end; return whether it ended."""
         self._thread.join(within_s)
         return not self._thread.is_alive()
 
     @property
     def busy_s(self) -> float:
-        """How many seconds what is being done takes so far."""
+        """Seconds that the current work has taken so far; 0 without any."""
         since_s = self._since_s
         return 0.0 if since_s is None else time.monotonic() - since_s
 
@@ -243,7 +243,7 @@ class Lane:
 
 @dataclass(slots=True)
 class Client:
-    """A page: what waits to be sent to it.
+    """A page, with the messages that wait to be sent to it.
 
     Attributes:
         wake: Called when something waits.
@@ -256,24 +256,24 @@ class Client:
     _events: dict[str, str] = field(default_factory=dict)
 
     def answer(self, text: str) -> None:
-        """Put an answer out to be sent."""
+        """Queue an answer to be sent."""
         self._answers.append(text)
         self.wake()
 
     def event(self, kind: str, text: str) -> None:
-        """Put the latest event of a kind out to be sent, in place of what still waits."""
+        """Queue an event, in place of an earlier one of its kind that still waits."""
         self._events[kind] = text
         self.wake()
 
     def next(self) -> str | None:
-        """Take what is to be sent next; None where nothing waits."""
+        """Take the next message to be sent; None where nothing waits."""
         if self._events:
             return self._events.pop(next(iter(self._events)))
         return self._answers.popleft() if self._answers else None
 
     @property
     def waiting(self) -> int:
-        """How many answers wait to be sent."""
+        """Number of answers that wait to be sent."""
         return len(self._answers)
 
 
@@ -294,7 +294,7 @@ class Hub:
         self._partings: list[str] = []
 
     def add(self, concerns: Sequence[Concern]) -> None:
-        """Have concerns answer from now on.
+        """Register concerns, which answer from now on.
 
         Raises:
             ValueError: Two answer one kind, or a kind is not called after its concern.
@@ -309,16 +309,16 @@ class Hub:
             self._concerns.append(concern)
 
     def begin(self) -> None:
-        """Have every concern begin."""
+        """Start every concern."""
         for concern in self._concerns:
             self._lanes[concern.lane].do(concern.begin)
 
     def do(self, lane: str, work: Callable[[], None], after_s: float = 0.0) -> None:
-        """Have something done in a lane, so many seconds from now at the earliest; from any thread."""
+        """Queue work in a lane, to begin so many seconds from now at the earliest; from any thread."""
         self._lanes[lane].do(work, after_s)
 
     def watch(self, lane: str, told: Callable[[float], None]) -> None:
-        """Have somebody told, in a thread of its own, how long a lane does one thing that takes long, and 0 once it is over.
+        """Report long work of a lane from a thread of its own: how long it takes, and 0 once it is over.
 
         Args:
             lane: Which.
@@ -337,12 +337,12 @@ class Hub:
         threading.Thread(target=look, name=f"studio watches {lane}", daemon=True).start()
 
     def tell(self, kind: str, body: Json) -> None:
-        """Tell every page; from any thread. Of a kind the latest is sent to a page that was not ready for those before."""
+        """Tell every page; from any thread. A page that was not ready for earlier events of this kind gets only the latest."""
         text = message(event=kind, body=body)
         self._onto_server(lambda: self._spread(kind, text))
 
     def _failed(self, error: BaseException) -> None:
-        """Tell every page of what went wrong where none had asked, and those that come later."""
+        """Report to every page, and to those that open later, an error that no question raised."""
         _, text, helps = _reason(error)
         self._wrong = {"text": text, "wrong": True, "helps": list(helps)}
         self.tell("said", self._wrong)
@@ -354,7 +354,7 @@ class Hub:
     # --- pages ---
 
     def enter(self, client: Client) -> None:
-        """Let a page in, and tell it how each concern stands: an event `NAME.state`, as when that changes."""
+        """Let a page in, and tell it the state of each concern: an event `NAME.state`, as when the state changes."""
         self._clients.append(client)
         if self._wrong is not None:
             client.event("said", message(event="said", body=self._wrong))
@@ -367,23 +367,23 @@ class Hub:
         self._onto_server(lambda: client.event(kind, text))
 
     def leave(self, client: Client) -> None:
-        """Forget a page, and cancel what it asked."""
+        """Forget a page, and cancel its questions."""
         if client in self._clients:
             self._clients.remove(client)
         for ask in list(client.open.values()):
             ask.cancel()
 
     def part(self, text: str) -> None:
-        """Have something said in words once the studio has ended, where it was started."""
+        """Add a message that is printed where the studio was started, once it has ended."""
         self._partings.append(text)
 
     @property
     def partings(self) -> Sequence[str]:
-        """What is to be said once the studio has ended."""
+        """The messages to print once the studio has ended."""
         return tuple(self._partings)
 
     def close(self) -> None:
-        """Let every concern let go."""
+        """Close every concern."""
         for client in list(self._clients):
             self.leave(client)
         for concern in self._concerns:
@@ -392,7 +392,7 @@ class Hub:
             lane.end()
 
     def ended(self, within_s: float) -> bool:
-        """Wait for the end of what is being done after `close`, in each lane at most so many seconds; whether it has come."""
+        """Wait after `close` for the current work to end, in each lane at most so many seconds; return whether it ended."""
         return all(lane.ended(within_s) for lane in list(self._lanes.values()))
 
     # --- questions ---
@@ -401,7 +401,7 @@ class Hub:
         """Take a message of a page: a question, or the cancelling of one.
 
         Raises:
-            Malformed: It is neither; what sends such is no page of ours.
+            Malformed: It is neither; no page of ours sends such a message.
         """
         fields = CheckedFields(said, "the message")
         number = fields.whole("id", 1, 2**53)
@@ -434,7 +434,7 @@ class Hub:
         self._onto_server(lambda: client.event(f"#{number}", text))
 
     def _finish(self, client: Client, number: int, ask: Ask, how: Callable[[], Json]) -> None:
-        """Answer, in the lane's thread."""
+        """Answer a question, in the lane's thread."""
         text = _answered(number, ask, how)
         if text is not None:
             self._onto_server(lambda: _close(client, number, text))
@@ -448,7 +448,7 @@ def _close(client: Client, number: int, text: str) -> None:
 
 
 def _answered(number: int, ask: Ask, how: Callable[[], Json]) -> str | None:
-    """Return the message; None where the answer comes later."""
+    """Return the message with the answer; None where the answer comes later."""
     try:
         ask.check()
         answer = how()
@@ -461,7 +461,7 @@ def _answered(number: int, ask: Ask, how: Callable[[], Json]) -> str | None:
 
 
 def _reason(error: BaseException) -> tuple[Code, str, Sequence[str]]:
-    """Say in words what was raised: a refusal as it says itself; a bug is printed, too."""
+    """Return an exception's code, message and helps: a refusal in its own words; a bug is printed, too."""
     match error:
         case CodedError() | Refused():
             return error.code, getattr(error, "shown", str(error)), error.helps

@@ -29,7 +29,7 @@ A_PIECE = 5_000
 
 @dataclass(slots=True)
 class _Traced:
-    """A variable in one log, as far as it was looked at: `changes` are ticks and values; `Gaps` tells which of them nobody has set."""
+    """A variable in one log, as far as it was read: `changes` are ticks and values; `Gaps` tells which of them nobody has set."""
 
     track: Track
     at: int
@@ -37,7 +37,7 @@ class _Traced:
     done: int = 0
 
     def follow(self, most: int) -> bool:
-        """Look at so many records more; whether the end is reached."""
+        """Read so many records more; return whether the end is reached."""
         unpack, packed = self.track.layout.unpack, self.track.packed
         to = min(len(packed), self.done + most)
         for place in range(self.done, to):
@@ -50,7 +50,7 @@ class _Traced:
         return to == len(packed)
 
     def with_gaps(self, spans: Sequence[tuple[int, bool]]) -> list[list[Any]]:
-        """Return the changes, with nothing where nobody has set it.
+        """Return the changes, with gaps where nobody has set the variable.
 
         Args:
             spans: From which tick on nobody has set it, or somebody has, in order (`Gaps.spans`).
@@ -82,11 +82,11 @@ class Plots(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"plot.names": self._names, "plot.curves": self._curves}
 
     def close(self) -> None:
-        """Let go of what was found."""
+        """Forget the curves found so far."""
         self._known, self._finding = {}, iter(())
 
     def _names(self, _: Ask) -> Json:
@@ -101,7 +101,7 @@ class Plots(Concern):
         return {"names": names, "displays": self._displays(known)}
 
     def _displays(self, known: Collection[str]) -> dict[str, list[str]]:
-        """What the studio's system shows, as far as the run has it: a log may be of another system, and holds no displays."""
+        """Return the displays of the studio's system, as far as the run has them: a log may be of another system, and holds none."""
         try:
             sets = description(self._time.live.opening.path).displays
         except (BadDescription, OSError):
@@ -110,7 +110,7 @@ class Plots(Concern):
         return {name: shown for name, shown in there.items() if shown}
 
     def _curves(self, ask: Ask) -> Json:
-        """Of each of some variables where it changed: `[tick, value]`, null for what nobody has set; a long run is looked at in pieces."""
+        """Return the changes of some variables: `[tick, value]`, null where nobody has set one; a long run is read in pieces."""
         names = ask.body.members("names")
         if len(names) > MOST_NAMES:
             raise Refused(Code.STUDIO, f"more than {MOST_NAMES} curves")
@@ -143,7 +143,7 @@ class Plots(Concern):
         return {"era": history.era, "first": history.first, "last": history.last, "curves": curves}
 
     def _traced(self, history: History, name: str) -> list[_Traced | int]:
-        """What is known of a variable, log by log of the run; the first tick of one in which it does not exist."""
+        """Return a variable's curve in each log of the run, or the first tick of a log that lacks the variable."""
         level, _, variable = name.partition(".")
         found = list[_Traced | int]()
         for log in history.logs:
@@ -179,7 +179,7 @@ class Plots(Concern):
 
 
 def _number(value: Value) -> float | int | None:
-    """A number that a curve can have; what is not finite is a gap."""
+    """Return the number that a curve shows; None, a gap, for one that is not finite."""
     if isinstance(value, bool):
         return int(value)
     return value if isinstance(value, int) or math.isfinite(value) else None

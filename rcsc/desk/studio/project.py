@@ -33,7 +33,7 @@ def concerns(
     drawer: Drawer | None = None,
     first: Path | None = None,
 ) -> Sequence[Concern]:
-    """Return everything that answers.
+    """Return all concerns of a studio.
 
     Args:
         opening: The system.
@@ -70,5 +70,5 @@ def concerns(
 
 
 def _sees(session: Session, desk: Desk) -> None:
-    """Have `reload` refuse what is on disk where a page shows another text of it."""
+    """Let `reload` refuse a file on disk while a page shows another text of it."""
     session.plant = replace(session.plant, unwritten=desk.unwritten)

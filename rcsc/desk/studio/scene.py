@@ -33,7 +33,7 @@ class Drawer(Protocol):
     """Draws a tick of a log."""
 
     def __call__(self, log: Log, tick: int, *, projected: bool) -> Drawing:
-        """Draw it: in perspective alone, or in three projections with it.
+        """Draw a tick: in perspective alone, or with three projections beside it.
 
         Raises:
             CodedError: It cannot be drawn, with the reason.
@@ -43,13 +43,13 @@ class Drawer(Protocol):
 
 @dataclass(slots=True)
 class Poses:
-    """Where bodies were, by tick."""
+    """The poses of bodies, by tick."""
 
     ticks: "array[int]"
     packed: list[bytes]
 
     def keep(self, tick: int, poses: bytes) -> None:
-        """Keep those of a tick, in place of all from it on; the same as before are not kept twice."""
+        """Keep the poses of a tick, in place of all from it on; poses equal to the last ones are not kept twice."""
         place = bisect_right(self.ticks, tick - 1)
         del self.ticks[place:], self.packed[place:]
         if not self.packed or self.packed[-1] != poses:
@@ -59,7 +59,7 @@ class Poses:
             del self.ticks[: MOST_KEPT // 2], self.packed[: MOST_KEPT // 2]
 
     def at(self, tick: int) -> bytes | None:
-        """Return the latest up to a tick; None where they are kept no more."""
+        """Return the latest poses up to a tick; None where they are kept no more."""
         place = bisect_right(self.ticks, tick) - 1
         return self.packed[place] if place >= 0 else None
 
@@ -81,13 +81,13 @@ class Scene(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "cell.space": self._shapes, "cell.poses": self._at, "cell.trace": self._trace, "cell.drawing": self._drawn,
         }  # fmt: skip
 
     def greeting(self) -> Json:
-        """Whether there is something to be seen."""
+        """Return whether there is a scene, with the reason if there is none, and whether drawings can be made."""
         return {
             "space": self._space is not None,
             "why": "" if self._space else self._why,
@@ -130,7 +130,7 @@ class Scene(Concern):
         return {"tick": tick, "poses": [round(number, 5) for number in array("f", held)]}
 
     def _trace(self, ask: Ask) -> Json:
-        """Where a body was, up to a tick: three numbers a moment, at most `MOST_TRACED` of them, at even distances."""
+        """Return the path of a body up to a tick: points of three numbers, at most `MOST_TRACED` of them, at even distances."""
         tick, body = ask.body.whole("tick", 0, 2**53), ask.body.whole("body", 0, 100_000)
         if self._time.source.log is not None:
             raise Refused(Code.STUDIO, NO_POSES)
@@ -160,7 +160,7 @@ class Scene(Concern):
         return {"svg": drawing.svg, "caption": list(drawing.caption)}
 
     def _picture(self, tick: int) -> str:
-        """The plant's own picture, which is of now alone."""
+        """Return the plant's own picture, which exists for the present tick alone."""
         if not self._pictured or self._time.source.log is not None:
             raise Refused(Code.STUDIO, "nothing here could be drawn of a log")
         system = self._time.live.session().system
@@ -170,5 +170,5 @@ class Scene(Concern):
 
 
 def _pictures(system: System) -> Mapping[str, Callable[[], str]]:
-    """How plants look, by kind of picture."""
+    """Return the functions that draw the plants, by kind of picture."""
     return {kind: draw for part in system.outside for kind, draw in getattr(part, "pictures", {}).items()}

@@ -97,12 +97,12 @@ class Server:
         asyncio.run(self._serve(concerns, opened))
 
     def stop(self) -> None:
-        """End; from any thread."""
+        """Stop serving; from any thread."""
         if self._over is not None:
             self._soon(self._over.set)
 
     def _soon(self, work: Callable[[], None]) -> None:
-        """Have something done in the server's thread; after the end nothing is."""
+        """Queue work in the server's thread; after the end, drop it."""
         loop = self._loop
         if loop is None or loop.is_closed():
             return
@@ -144,7 +144,7 @@ class Server:
             )  # who ends while a process begins leaves that without a parent
 
     async def _listens(self) -> asyncio.Server:
-        """Raises: NoPort: It cannot."""
+        """Listen at the port; raise `NoPort` where that fails."""
         assert self._entrance is not None
         try:
             return await self._entrance.listen(ADDRESS, self._wanted)
@@ -172,7 +172,7 @@ class Server:
             return web.Response(status=500, text=f"a bug in rcsc: {type(error).__name__}\n")
 
     async def _headed(self, _: web.Request, response: web.StreamResponse) -> None:
-        """Give every answer the headers, a refusal, too."""
+        """Add the headers to every answer, refusals included."""
         response.headers.update({**HEADERS, "Content-Security-Policy": policy(self._port)})
 
     async def _file(self, request: web.Request) -> web.Response:
@@ -206,7 +206,7 @@ class Server:
         return socket
 
     async def _listen(self, socket: web.WebSocketResponse, client: Client) -> None:
-        """Take what the page says until it goes; what is no message of a page ends the talk."""
+        """Take the page's messages until it goes; a malformed message ends the talk."""
         async for said in socket:
             if said.type != WSMsgType.TEXT:
                 return
@@ -217,7 +217,7 @@ class Server:
 
 
 def _end_in_order(loop: asyncio.AbstractEventLoop, over: asyncio.Event) -> None:
-    """Let a signal that asks the process to end set an event, where signals are heard: in the main thread, and not on every system."""
+    """Let a signal that asks the process to end set an event. Signals are heard in the main thread alone, and not on every system."""
     if threading.current_thread() is not threading.main_thread():
         return
     for name in ("SIGTERM", "SIGHUP"):
@@ -226,7 +226,7 @@ def _end_in_order(loop: asyncio.AbstractEventLoop, over: asyncio.Event) -> None:
 
 
 async def _send(socket: web.WebSocketResponse, client: Client, woken: asyncio.Event) -> None:
-    """Send what waits, as fast as the page takes it."""
+    """Send waiting messages, as fast as the page takes them."""
     try:
         while True:
             await woken.wait()

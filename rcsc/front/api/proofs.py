@@ -90,7 +90,7 @@ def _settings(paths: Sequence[PathLike], *, cache: bool) -> Settings:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One thing that is claimed of a level in its system, and how it stands.
+    """A claim about a level in its system, and its verdict.
 
     Attributes:
         what: The kind of claim, in words: `assumption`, `some line matches`, `property` and so on.
@@ -114,7 +114,7 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Unproved:
-    """Something that is not proved, with the shortest run that breaks it.
+    """A finding of a proof, with the shortest run that breaks the claim.
 
     Attributes:
         what: What is not proved, in words.
@@ -142,7 +142,7 @@ class Unproved:
 
 @dataclass(frozen=True, slots=True)
 class Consequence:
-    """One way in which a run goes on that breaks what is not proved, up to what the superior takes from it.
+    """A continuation of a run that breaks a claim, up to what the superior takes from it.
 
     Attributes:
         how: `answered`, `changed` (an answer), `stops` (the system, as no line or several match) or `repeats` (unanswered).
@@ -159,7 +159,7 @@ class Consequence:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What is proved of a system's levels together.
+    """The proof of a system's levels together.
 
     Attributes:
         proved: Whether nothing is found wrong.

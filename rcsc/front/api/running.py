@@ -34,7 +34,7 @@ class NotProvedError(CodedError):
 
 @dataclass(slots=True)
 class _Orders:
-    """Whoever gives the orders: something outside, as any other.
+    """The giver of orders: a part outside, as any other.
 
     Attributes:
         lines: The orders to each level that was ordered, by its name.
@@ -43,7 +43,7 @@ class _Orders:
     lines: dict[str, Orders] = field(default_factory=dict)
 
     def step(self, _tick: int, _latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
-        """One tick: what stands is published."""
+        """Run one tick: publish the present orders."""
         return {line.order: line.sent for line in self.lines.values()}
 
 
@@ -71,12 +71,12 @@ class LoadedSystem:
 
     @property
     def seconds(self) -> float:
-        """The control time that they took."""
+        """The control time of the ticks done so far."""
         return self.system.tick * self.system.description.tick_ms / 1000
 
     @property
     def over(self) -> bool:
-        """Whether the plant says that the run is at its end."""
+        """True once the plant reports the end of the run."""
         return self._staged.over
 
     @property
@@ -121,7 +121,7 @@ class LoadedSystem:
             self.system.step()
 
     def value(self, variable: str) -> Shown:
-        """The value of `LEVEL.VARIABLE` as the last tick left it.
+        """Return the value of `LEVEL.VARIABLE` as the last tick left it.
 
         Raises:
             KeyError: There is no such level, or no such single value in it.
@@ -152,7 +152,7 @@ class LoadedSystem:
         self._orders.lines.setdefault(to.level, line_to(to)).send(to.order_with(values))
 
     def report(self, level: str | None = None) -> dict[str, Shown] | None:
-        """What a level reports of its last order from outside, by field; None while it has not echoed it.
+        """Return the report of a level on its last order from outside, by field; None while it has not echoed it.
 
         Raises:
             KeyError: No such level is ordered from outside.
@@ -180,7 +180,7 @@ def load_system(
     seed: int = 0,
     prove: bool = True,
 ) -> LoadedSystem:
-    """A system ready to run: what changed is proved and compiled, and its plant stands beside it.
+    """Load a system, ready to run: prove and compile what changed, and place its plant beside it.
 
     Args:
         path: The description, `system.toml`.
@@ -200,7 +200,7 @@ def load_system(
 
 @dataclass(frozen=True, slots=True)
 class RowOutcome:
-    """What became of a row of a script.
+    """The result of a row of a script.
 
     Attributes:
         number: As the file counts, from 1.
@@ -285,7 +285,7 @@ UNORDERED_TICKS = 1000
 def _staged(
     path: Path, plant: str | None, script: str | None, seed: int, *, prove: bool
 ) -> tuple[Description, Mapping[str, Signature], Staged]:
-    """The system, proved and compiled, and what stands outside; a script of None is the description's, an empty one none."""
+    """Prove and compile the system, and stage the parts outside; a script of None is the description's, an empty one none."""
     system = description(path)
     if prove:
         report = compile_system(path).report
@@ -299,7 +299,7 @@ def _staged(
 
 @contextmanager
 def _recorded(running: System, log: PathLike | None) -> Iterator[None]:
-    """Keeps every cycle, where a log is asked for."""
+    """Record every cycle, where a log is asked for."""
     if log is None:
         yield
         return

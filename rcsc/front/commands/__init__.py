@@ -81,7 +81,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 def _unwritable(place: str, why: str | None) -> int:
-    """A full disk, or one that is read only."""
+    """Report a full disk, or one that is read only."""
     with contextlib.suppress(OSError):  # it may be the disk that this goes to
         click.echo(
             f"error[RCS502]: {place} cannot be written: {why or 'no reason given'}\n"
@@ -92,7 +92,7 @@ def _unwritable(place: str, why: str | None) -> int:
 
 
 def _forget_stdout() -> None:
-    """Whoever read the output has gone: let the interpreter's last flush go nowhere."""
+    """Let the interpreter's last flush go nowhere: whoever read the output has gone."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

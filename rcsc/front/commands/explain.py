@@ -25,7 +25,7 @@ def command(code: str | None) -> int:
 
 
 def _page(code: Code) -> str:
-    """One code's page."""
+    """Return the page of one code."""
     explanation = code.explanation
     blocks = explanation.text.split("\n\n")
     paragraphs = [block if block.startswith(" ") else fill(block, 90) for block in blocks]
@@ -46,7 +46,7 @@ def _indented(text: str) -> str:
 
 
 def _listing() -> str:
-    """Every code with its title, by family."""
+    """Return every code with its title, by family."""
     families = [
         "\n".join(
             [f"{digit}xx {about}"]

@@ -57,7 +57,7 @@ class Group(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that the first argument names, and the arguments that are left for it."""
+        """Return the command that the first argument names, and the remaining arguments for it."""
         name, summary, rest = super().resolve_command(ctx, args)
         return name, None if summary is None else imported(str(summary.name)), rest
 
@@ -78,7 +78,7 @@ class Group(click.Group):
 
 
 def imported(name: str) -> click.Command:
-    """The command of this name, from its module."""
+    """Import the command of this name from its module."""
     module = next(module for module in COMMANDS if module.rpartition(".")[2] == name)
     command: click.Command = import_module(f"rcsc.front.commands.{module}").command
     return command

@@ -64,7 +64,7 @@ def command(folder: Path, template: str | None, example: str | None, output: Out
 
 
 def _scaffold(folder: Path, kind: str) -> tuple[Path, ...] | Diagnostic:
-    """Make the project in `folder`, new or empty; what was written, or why not."""
+    """Make the project in `folder`, new or empty; return the files written, or the reason why there are none."""
     name = re.sub(r"\W", "_", folder.resolve().name, flags=re.ASCII) or "robot"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -82,7 +82,7 @@ def _scaffold(folder: Path, kind: str) -> tuple[Path, ...] | Diagnostic:
 
 
 def _files(kind: str) -> Iterator[tuple[str, bytes]]:
-    """The files of a template by their paths in the project, in order; of the paper's system its tables, too."""
+    """Yield the files of a template by their paths in the project, in order; of the paper's system its tables, too."""
     package = files("rcsc")
     yield from _below(package / "front" / "commands" / "templates" / kind)
     if kind == "nbs":

@@ -23,7 +23,7 @@ from rcsc.run.system import System, assemble
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What was compared.
+    """The outcome of a comparison.
 
     Attributes:
         ticks: Done in both, up to the first difference.
@@ -41,7 +41,7 @@ class Beside:
 
 @dataclass(slots=True)
 class _Told:
-    """What stands outside: it publishes what the script says."""
+    """The script's part outside: it publishes the values of the script."""
 
     publishes: Published = field(default_factory=dict)
 
@@ -50,7 +50,7 @@ class _Told:
 
 
 def run_beside(system: Linked, described: Description, script: Sequence[Tick]) -> Beside:
-    """Run a script in the C of a system and in the Python system.
+    """Run a script in the C of a system and in the Python system, and compare them.
 
     Args:
         system: What the C was made of; it asks no database and calls no function of the user's.
@@ -69,7 +69,7 @@ def run_beside(system: Linked, described: Description, script: Sequence[Tick]) -
 
 @dataclass(slots=True)
 class _Pair:
-    """Both systems, and what they were before.
+    """Both systems, and their states after each tick.
 
     Attributes:
         before: After each tick, the leaves of every level in Python, and the whole of the C.
@@ -81,7 +81,7 @@ class _Pair:
     before: list[tuple[dict[str, Values], bytes]] = field(default_factory=list)
 
     def run(self, script: Sequence[Tick]) -> Beside:
-        """All ticks, or up to the first difference."""
+        """Run all ticks, or up to the first difference."""
         restarts = refused = faults = 0
         for number, tick in enumerate(script):
             for begin in tick.begins:
@@ -110,7 +110,7 @@ class _Pair:
         return Beside(number, restarts, refused, faults, f"tick {number}: {difference}")
 
     def _begun(self, begin: Begin) -> tuple[bool, bool]:
-        """Whether each let a level start again."""
+        """Restart a level in both; return for Python and for C whether it accepted the state."""
         name, since, spoilt = begin
         values: Values | None = None
         if since is not None:
@@ -125,7 +125,7 @@ class _Pair:
         return taken, self.c.begin(name, None if since is None else self.before[since][1], spoilt)
 
     def _stepped(self, tick: Tick) -> tuple[str, str]:
-        """One tick of each: the level that faulted first, and where they do not agree on it."""
+        """Run one tick of each; return the level that faulted first, and the difference where they do not agree on it."""
         self.told.publishes = tick.publishes
         in_python = ""
         try:
@@ -151,7 +151,7 @@ class _Pair:
 
 
 def _unequal(what: str, names: Sequence[str], in_c: Values, in_python: Values) -> Iterator[str]:
-    """Values that are not the same; a NaN is the same as a NaN."""
+    """Yield the values that differ; a NaN equals a NaN."""
     for name, one, other in zip(names, in_c, in_python, strict=True):
         if one != other and not (one != one and other != other):  # noqa: PLR0124  # a NaN is not equal to itself
             yield f"`{what}{name}` is {one!r} in C and {other!r} in Python"
@@ -182,11 +182,11 @@ class _InC:
         init(self.memory)
 
     def step(self) -> str:
-        """The level that faulted first; empty for none."""
+        """Run one step; return the level that faulted first, or empty for none."""
         return self._names[int(self._step(self.memory))]
 
     def begin(self, level: str, before: bytes | None, spoilt: tuple[int, Value] | None) -> bool:
-        """Whether a level could start again: anew, or from a copy, in which a leaf may be another value."""
+        """Restart a level, anew or from a copy with one leaf changed; return whether it could."""
         number = self._names.index(level)
         if before is None:
             return bool(self._restart(self.memory, number) == -1)
@@ -202,12 +202,12 @@ class _InC:
             struct.pack_into(f"={form}", self.memory, at, value)
 
     def values(self, name: str) -> Values:
-        """Leaves and trace of a level, or the leaves of a buffer."""
+        """Return leaves and trace of a level, or the leaves of a buffer."""
         return tuple(struct.unpack_from(f"={form}", self.memory, at)[0] for at, form in self.places[name])
 
 
 def _members(system: Linked) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """Yield each level and each buffer: the members of the struct that are its leaves, with their formats."""
+    """Yield each level and each buffer with the members of the struct that are its leaves, and their formats."""
     for level in system.levels:
         sign = level.program.sign
         leaves = [
@@ -228,7 +228,7 @@ def _members(system: Linked) -> Iterator[tuple[str, list[tuple[str, str]]]]:
 def _built(
     system: Linked, sources: Path, folder: Path, members: Mapping[str, Sequence[tuple[str, str]]]
 ) -> ctypes.CDLL:
-    """The library.
+    """Build the library.
 
     Raises:
         NotBuilt: There is no compiler, or it refused.

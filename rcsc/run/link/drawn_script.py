@@ -20,7 +20,7 @@ Begin: TypeAlias = tuple[str, int | None, tuple[int, Value] | None]
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What happens in one tick.
+    """The events of one tick.
 
     Attributes:
         begins: Before it.
@@ -32,12 +32,12 @@ class Tick:
 
 
 def drawing(seed: int | str) -> Random:
-    """Return what draws, the same every time."""
+    """Return a generator that draws the same numbers every time."""
     return Random(seed)  # noqa: S311  # repeatable on purpose
 
 
 def edges(leaf: Leaf) -> list[Value]:
-    """Return values at the edges of a leaf's range, and just beyond where its C type holds that."""
+    """Return values at the edges of a leaf's range, and just beyond where its C type holds such."""
     if leaf.c_type == "bool":
         return [False, True]
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
@@ -49,7 +49,7 @@ def edges(leaf: Leaf) -> list[Value]:
 
 
 def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
-    """Return a value for a leaf: mostly in its range, a number mostly the one before or the next."""
+    """Draw a value for a leaf: mostly in its range, a number mostly the one before or the next."""
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
     inside = [value for value in edges(leaf) if leaf.c_type == "bool" or low <= value <= high]
     way = random.random()
@@ -67,7 +67,7 @@ def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
 def script(
     system: Description, signs: Mapping[str, Signature], random: Random, ticks: int, wild: float = 0.03
 ) -> list[Tick]:
-    """Return a script for a system; buffers keep their values for some ticks, and some are not there from the beginning.
+    """Draw a script for a system; buffers keep their values for some ticks, and some are missing at the beginning.
 
     Args:
         system: The description.

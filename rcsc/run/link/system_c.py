@@ -67,7 +67,7 @@ def _rendered(system: Linked) -> dict[str, Rendered]:
 
 
 def outward(system: Linked) -> Iterator[tuple[str, str]]:
-    """Yield each name in C that others than the system's own source see, and what it is."""
+    """Yield each name in C that is visible outside the system's own source, and its kind."""
     maker = _Maker(system)
     names = [f"{system.word}.h", guard(system.word), *(f"{system.word}_{end}" for end in OWN)]
     names += [name for _, name, _ in maker.structs()]
@@ -85,7 +85,7 @@ class _Maker:
         self.origin = Origin(Sort.SYSTEM, system.word)
 
     def view(self) -> dict[str, object]:
-        """What the templates lay out."""
+        """Return the view that the templates lay out."""
         levels = self.system.levels
         programs = [program.names.program for program in self.system.programs]
         return {
@@ -109,7 +109,7 @@ class _Maker:
     # --- declarations ---
 
     def constants(self) -> Fields:
-        """The levels by number, from 1."""
+        """Return the constants of the levels: their numbers, from 1."""
         every = [(f"{constant_word(self.word, 'level', 'none')} = 0", "")]
         for at, level in enumerate(self.system.levels, start=1):
             every.append(
@@ -118,7 +118,7 @@ class _Maker:
         return every
 
     def structs(self) -> Iterator[tuple[str, str, Fields]]:
-        """The doc of each struct, its name, its members."""
+        """Yield the doc of each struct, its name, its members."""
         sides = (
             (IN, "from", "What stands outside gives: fill it before each step. Until then it is what the levels begin with."),
             (OUT, "to", "What stands outside is given: as the last step left it."),
@@ -171,7 +171,7 @@ class _Maker:
         return Do(Invoke(f"{self.word}_{name}_{level.member}", (Name("s"),)))
 
     def _level(self, level: LinkedLevel) -> Iterator[Function]:
-        """What is done with one level."""
+        """Yield the functions of one level."""
         if level.takes or level.questions:
             yield self._function(
                 f"Level {level.name} takes its inputs.", f"take_{level.member}", self._taken(level)
@@ -201,7 +201,7 @@ class _Maker:
         )
 
     def _taken(self, level: LinkedLevel) -> Iterator[Stmt]:
-        """Its buffers, then the answers about what these say: every question is put before the first answer comes."""
+        """Yield copies of its buffers, then the queries that they determine: all keys are read before the first answer comes."""
         for buffer in level.takes:
             if buffer.target is not None:
                 yield from _copied(
@@ -224,7 +224,7 @@ class _Maker:
             yield Do(Invoke(question.function, (*keys, answer)))
 
     def _anew(self, level: LinkedLevel) -> Iterator[Stmt]:
-        """As `rcsc.run.adopt.restart` does without a checkpoint."""
+        """Yield what `rcsc.run.adopt.restart` does without a checkpoint."""
         state, program = f"s->{level.member}", level.program.names.program
         starts = adoption(level.program.sign)
         yield Let(f"{program}_t", "now", Name(state))
@@ -275,7 +275,7 @@ class _Maker:
                 assert_never(start)
 
     def _kept(self, level: LinkedLevel) -> Iterator[Stmt]:
-        """As `rcsc.run.adopt.restart` does with a checkpoint: leaves alone, and not the trace."""
+        """Yield what `rcsc.run.adopt.restart` does with a checkpoint: only leaves are restored, not the trace."""
         state, program = f"s->{level.member}", level.program.names.program
         yield Let("const int32_t", "at", Invoke(f"{program}_check", (Name("from"),)))
         now = Let(f"{program}_t", "now", Name("*from"))
@@ -357,7 +357,7 @@ def _has_reals(program: LevelProgram) -> bool:
 
 
 def _doc(buffer: Buffer) -> str:
-    """The comment of a buffer: both ends, the range, what becomes of a reading beyond it."""
+    """Return the comment of a buffer: both ends, the range, and the treatment of a reading beyond it."""
     words = [f"{buffer.wire.source} = {buffer.wire.target}", range_text(buffer.end.kind)]
     if buffer.side == IN and isinstance(buffer.end.kind, Scalar) and range_text(buffer.end.kind):
         variable = buffer.end.program.plan.program.variable(buffer.end.variable)
@@ -366,12 +366,12 @@ def _doc(buffer: Buffer) -> str:
 
 
 def _due(level: LinkedLevel, *body: Stmt) -> Body:
-    """What is done in the cycles of a level."""
+    """Return statements guarded so that they run only in the cycles of a level."""
     return (when(Name(f"due_{level.member}"), *body),) if level.ticks > 1 else body
 
 
 def _chosen(each: Iterable[tuple[LinkedLevel, Code]]) -> Iterator[Stmt]:
-    """One of several calls, by the level."""
+    """Yield the statements that choose one of several calls, by the level."""
     yield Let("int32_t", "at")
     yield Frame(("switch (level) {",))
     for level, call in each:
@@ -388,12 +388,12 @@ def _constant(program: LevelProgram, kind: Scalar, value: Value) -> Code:
 
 
 def _greatest(level: LinkedLevel, start: Numbered) -> int:
-    """The greatest number that the leaf's type in C holds."""
+    """Return the greatest number that the leaf's type in C holds."""
     return type_bounds(level.program.sign.leaves[start.at].c_type)[1]
 
 
 def _standing(level: LinkedLevel, at: int) -> str:
-    """The member of the system's struct in which an output stands for those who read it; empty where nobody does."""
+    """Return the member of the system's struct through which others read an output; empty where nobody does."""
     place = ""
     for buffer in level.gives:
         if buffer.source is not None and at in buffer.source.run:
@@ -407,7 +407,7 @@ Placed: TypeAlias = tuple[str, Type, LevelProgram]
 
 
 def _copied(to: str, to_end: End, of: str, of_end: End) -> Body:
-    """Copies a value from one place to another: at once where both have one type of C, else part by part."""
+    """Return the statements that copy a value to another place: at once where both have one type of C, else part by part."""
     return tuple(_parts((to, to_end.kind, to_end.program), (of, of_end.kind, of_end.program), 0))
 
 
@@ -438,7 +438,7 @@ def _parts(target: Placed, source: Placed, depth: int) -> Iterator[Stmt]:
 
 
 def _counted(count: str, end: int, *body: Stmt) -> Stmt:
-    """A loop from 0 up to the end, which is left out."""
+    """Return a loop from 0 up to the end, exclusive."""
     name, zero, step = Name(count), Constant(0, "uint32_t"), Constant(1, "uint32_t")
     goes = infix("<", name, Constant(end, "uint32_t"))
     return repeated(Set(name, zero), goes, Set(name, infix("+", name, step)), *body, bound=times(end))

@@ -39,14 +39,14 @@ DOES = ("take", "give", "restart", "resume")
 
 @dataclass(frozen=True, slots=True)
 class LevelProgram:
-    """The program of a level, as C has it."""
+    """The program of a level with its names in C."""
 
     plan: Plan
     names: Names
     sign: Signature
 
     def path(self, at: int) -> str:
-        """The member of the struct that is the leaf at a position."""
+        """Return the member of the struct that is the leaf at a position."""
         return "".join(self.names.paths[self.sign.leaves[at].name])
 
 
@@ -69,15 +69,15 @@ class End:
 
     @property
     def run(self) -> range:
-        """Positions of its leaves."""
+        """The positions of its leaves."""
         return self.program.sign.record(self.variable)
 
     def declared(self, name: str) -> str:
-        """The declaration of a variable of its type."""
+        """Return the declaration of a variable of its type."""
         return declared(self.program.names, name, self.kind, defensive=self.program.plan.defensive)
 
     def part(self, at: int) -> str:
-        """What a leaf's path has after that of the end."""
+        """Return the rest of a leaf's path after that of the end."""
         return self.program.path(at).removeprefix(self.path)
 
 
@@ -102,7 +102,7 @@ class Buffer:
 
     @property
     def end(self) -> End:
-        """The end whose type it has: the reader's, if that is a level."""
+        """The end whose type the buffer has: the reader's, if that is a level."""
         end = self.target or self.source
         assert end is not None
         return end
@@ -115,7 +115,7 @@ class Buffer:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What the database is asked in every cycle of a level.
+    """A query to the database in every cycle of a level.
 
     Attributes:
         function: The user's function, by its name in C.
@@ -179,12 +179,12 @@ class Linked:
         return [every[name] for name in sorted(every)]
 
     def parties(self, side: str) -> list[str]:
-        """Those outside that a side of the struct has members for, in the description's order."""
+        """Return the outside parties for which a side of the struct has members, in the description's order."""
         return list(dict.fromkeys(buffer.party for buffer in self.buffers if buffer.side == side))
 
 
 def system_word(name: str, programs: Iterable[str], prefix: str = "") -> str:
-    """The word of a system in C, which none of its programs bears.
+    """Return the word of a system in C, which none of its programs has.
 
     Args:
         name: The system's.
@@ -196,7 +196,7 @@ def system_word(name: str, programs: Iterable[str], prefix: str = "") -> str:
 
 
 def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linked:
-    """Return the system with every place found.
+    """Return the system with all its places in the struct.
 
     Args:
         system: The description.
@@ -277,7 +277,7 @@ class _Wiring:
         self.scope = c_scope({f"{self.word}_{end}" for end in OWN})
 
     def buffer(self, wire: Wire) -> Buffer:
-        """A buffer with its ends and its place."""
+        """Return a buffer with its ends and its place."""
         ends = [self._wired(text) for text in (wire.source, wire.target)]
         source, target = ends
         if source is not None and target is not None:
@@ -290,7 +290,7 @@ class _Wiring:
         return Buffer(wire, source, target, side, party, self._member(f"{side} {party}", variable))
 
     def question(self, spec: LevelSpec, at: int) -> Question:
-        """A question of a level; those of one name and one form are one function."""
+        """Return a query of a level; queries of one name and one form are one function."""
         feed = spec.feeds[at]
         keys = tuple(self._end(spec.name, key) for key in feed.keys)
         into = self._end(spec.name, feed.into)
@@ -303,12 +303,12 @@ class _Wiring:
         return self.members.setdefault(struct, c_scope()).fresh(parameter_word(text))
 
     def _wired(self, text: str) -> End | None:
-        """The end that a buffer names; None where it is no level's."""
+        """Return the end that a buffer names; None where it is no level's."""
         level, _, variable = text.partition(".")
         return self._end(level, variable) if level in self.programs else None
 
     def _end(self, level: str, variable: str) -> End:
-        """A variable of a level or a part of one, which is there."""
+        """Return a variable of a level, or a part of one, which must exist."""
         program = self.programs[level]
         names, meaning = program.names, program.plan.program
         if variable in names.paths:

@@ -16,7 +16,7 @@ Latest = Callable[[str], Values | None]
 
 @dataclass(slots=True)
 class Orders:
-    """What stands in an order buffer, and how its answer is told.
+    """The orders sent over one order buffer, and the report that answers them.
 
     Attributes:
         order: Name of the buffer; `report` of the one that answers.
@@ -35,7 +35,7 @@ class Orders:
     numbers: int = NUMBERS
 
     def catch_up(self, latest: Latest) -> None:
-        """Before the first order: numbers go on from the one that stands in the buffer, else from what was echoed."""
+        """Continue the numbers, before the first order, from the one in the buffer, else from the echoed one."""
         if self.sent:
             return
         standing, report = latest(self.order), latest(self.report)
@@ -45,11 +45,11 @@ class Orders:
             self.number = int(report[self.echo_at])
 
     def send(self, values: Sequence[Value]) -> None:
-        """Makes this the order, with the next number in its place."""
+        """Set the order, with the next number in its place."""
         self.number = (self.number + 1) % self.numbers
         self.sent = (*values[: self.number_at], self.number, *values[self.number_at :])
 
     def answer(self, latest: Latest) -> Values | None:
-        """The report, if it is about the last order; None while it is not."""
+        """Return the report, if it answers the last order; else None."""
         report = latest(self.report)
         return report if report is not None and report[self.echo_at] == self.number else None

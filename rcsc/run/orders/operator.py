@@ -25,17 +25,17 @@ class ScriptRow(Protocol):
 
     @property
     def number(self) -> int:
-        """As its file counts, from 1."""
+        """The row's number in its file, from 1."""
         ...
 
     @property
     def text(self) -> str:
-        """As it is shown."""
+        """The row's text, as it is shown."""
         ...
 
 
 class Result(Protocol):
-    """What became of a row of any script."""
+    """The result of a row of any script."""
 
     @property
     def row(self) -> ScriptRow:
@@ -44,22 +44,22 @@ class Result(Protocol):
 
     @property
     def state(self) -> str:
-        """`done`, `failed`, or what else became of it."""
+        """`done`, `failed`, or another state."""
         ...
 
     @property
     def reason(self) -> str:
-        """Why it was not done; empty where it was."""
+        """The reason why the row was not done; empty where it was."""
         ...
 
     @property
     def ticks(self) -> int:
-        """How many cycles it took, the one in which its end was seen included: those of all rows are those of the run."""
+        """Number of cycles that the row took, with the one that saw its end: those of all rows add up to those of the run."""
         ...
 
 
 class Operator(Protocol):
-    """Who gives orders: something outside that works through rows."""
+    """The giver of orders: a part outside that works through rows."""
 
     @property
     def rows(self) -> Sequence[ScriptRow]:
@@ -73,17 +73,17 @@ class Operator(Protocol):
 
     @property
     def results(self) -> Sequence[Result]:
-        """Rows that are over."""
+        """Results of the rows that are over."""
         ...
 
     @property
     def over(self) -> bool:
-        """Whether every row is done, or one was not."""
+        """True once every row is done, or one was not."""
         ...
 
     @property
     def at_rest(self) -> bool:
-        """Whether a failure has been answered by rest, or was waited for in vain."""
+        """True once the level rests after a failure, or the wait for that was in vain."""
         ...
 
     @property
@@ -92,17 +92,17 @@ class Operator(Protocol):
         ...
 
     def begin_at(self, row: int) -> None:
-        """Goes on at another row, from 0, as if those between were done."""
+        """Continue at another row, from 0, as if those between were done."""
         ...
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One tick."""
+        """Run one tick."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """What became of a row: `state` is `done` where it ended as it was to, else `failed`; `ticks` as of `Result`."""
+    """The result of a row: `state` is `done` where it ended as it was to, else `failed`; `ticks` as of `Result`."""
 
     row: OrderRow
     state: str
@@ -129,19 +129,19 @@ class ScriptOperator:
     _holding: OrderRow | None = None  # whose values and faults this tick has
 
     def __post_init__(self) -> None:
-        """Opens a line to every level that the script orders."""
+        """Open a line to every level that the script orders."""
         for row in self.rows:
             if row.served is not None and row.served.level not in self._lines:
                 self._lines[row.served.level] = line_to(row.served)
 
     @property
     def over(self) -> bool:
-        """Whether every row is done, or one was not."""
+        """True once every row is done, or one was not."""
         return self.at >= len(self.rows) or self.stopped is not None
 
     @property
     def at_rest(self) -> bool:
-        """Whether the order to rest after a failure has been answered, or was waited for in vain."""
+        """True once the order to rest after a failure has been answered, or the wait for that was in vain."""
         return self._resting < 0
 
     @property
@@ -152,16 +152,16 @@ class ScriptOperator:
 
     @property
     def held(self) -> Mapping[str, Mapping[int, Value]]:
-        """What buffers from outside hold because of the row under way."""
+        """The values that the row under way sets in buffers from outside: by the buffer, by the place in it."""
         return {} if self._holding is None else self._holding.set
 
     @property
     def faults(self) -> frozenset[str]:
-        """The plant's faults that are on because of the row under way."""
+        """The plant's faults that the row under way switches on."""
         return frozenset(() if self._holding is None else self._holding.faults)
 
     def begin_at(self, row: int) -> None:
-        """Goes on at another row, as if those between were done.
+        """Continue at another row, as if those between were done.
 
         Args:
             row: From 0.
@@ -169,14 +169,14 @@ class ScriptOperator:
         self.at, self._since, self._holding = row, -1, None
 
     def state(self) -> dict[str, Any]:
-        """What a stopped one goes on from; its orders stand in their buffers."""
+        """Return the state from which a stopped script continues; its orders stand in their buffers."""
         return {"at": self.at}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Puts back a state, and tries its row again; numbers go on from those in the buffers.
+        """Put back a state, and try its row again; numbers go on from those in the buffers.
 
         Raises:
-            ValueError: It is none.
+            ValueError: The state is none of a script.
         """
         at = state.get("at")
         if type(at) is not int or not 0 <= at < len(self.rows) or len(state) != 1:
@@ -187,7 +187,7 @@ class ScriptOperator:
             line.sent = ()
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One tick: begin a row, wait for its end, or rest."""
+        """Run one tick: begin a row, wait for its end, or rest."""
         for line in self._lines.values():
             line.catch_up(latest)
         self._holding = None
@@ -210,7 +210,7 @@ class ScriptOperator:
             self._end(row, tick, state, reason)
 
     def _now(self, row: OrderRow, ticks: int, latest: Latest) -> tuple[str, str]:
-        """How a row stands after so many cycles, and why it failed; the first is empty while it is under way."""
+        """Return the state of a row after so many cycles, and the reason of a failure; an empty state while it is under way."""
         if row.cycles is not None:  # nothing is waited for: it ends in its last cycle, not in the one after
             return (DONE, "") if ticks + 1 >= row.cycles else ("", "")
         assert row.served is not None  # a row without a command takes so many cycles
@@ -249,14 +249,14 @@ class ScriptOperator:
 
 
 def line_to(level: Served) -> Orders:
-    """Return what carries orders to a level, with its range of numbers."""
+    """Return the orders to a level, with its range of numbers."""
     high = level.order_leaves[level.number].high
     numbers = int(high) + 1 if high is not None else 2
     return Orders(level.order, level.report, level.echo, level.number, numbers=numbers)
 
 
 def answer_reason(level: Served, report: Values) -> str:
-    """What a report says beside the protocol: why it failed."""
+    """Return the fields of a report beside the protocol's: the reason of a failure."""
     fields = [
         f"{field_of(leaf)} {leaf.shown(value)}"
         for leaf, value in zip(level.report_leaves, report, strict=True)
@@ -267,7 +267,7 @@ def answer_reason(level: Served, report: Values) -> str:
 
 @dataclass(slots=True)
 class ScriptedRun:
-    """A system with somebody who orders it, or nobody, to be stepped to the end.
+    """A system with an operator, or with none, to be stepped to the end.
 
     Attributes:
         first_tick: With which it began; not 0 where it goes on from a run that stopped.
@@ -279,14 +279,14 @@ class ScriptedRun:
 
     @property
     def ended(self) -> bool:
-        """Whether the script is at its end and its level rests, or something outside says that it is over."""
+        """True once the script has ended and its level rests, or a part outside says that the run is over."""
         operator = self.operator
         if operator is not None and operator.over and operator.at_rest:
             return True
         return any(getattr(part, "over", False) for part in self.system.outside if part is not operator)
 
     def steps(self, most: int = MOST_TICKS) -> Iterator[Result]:
-        """Runs to the end, or to what stops the script and until the level rests; each result as it comes.
+        """Run to the end, or until the level rests after a failure; yield each result as it comes.
 
         Args:
             most: Ticks after which the run is given up.

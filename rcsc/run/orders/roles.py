@@ -55,17 +55,17 @@ class Served:
         return {field_of(leaf): leaf for place, leaf in enumerate(self.order_leaves) if place != self.number}
 
     def order_with(self, given: Mapping[str, Value]) -> tuple[Value, ...]:
-        """The fields of an order but its number; what is not given is as its variable is at first."""
+        """Return the fields of an order but its number; a field that is not given has its variable's initial value."""
         return tuple(given.get(name, leaf.initial) for name, leaf in self.fields.items())
 
 
 def served(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
-    """Find the levels that somebody outside orders by number and to whom they report, from the top down."""
+    """Find the levels that a party outside orders by number and to which they report, from the top down."""
     return tuple(level for level in ordered(system, signs) if level.party not in signs)
 
 
 def ordered(system: Description, signs: Mapping[str, Signature]) -> tuple[Served, ...]:
-    """Find the levels that somebody orders by number, a level above or somebody outside, from the top down."""
+    """Find the levels that take numbered orders, from a level above or from outside, from the top down."""
     wires = [(wire.source, wire.target) for wire in system.wires]
     levels = []
     for source, target in wires:
@@ -93,14 +93,14 @@ def ordered(system: Description, signs: Mapping[str, Signature]) -> tuple[Served
 
 
 def _words(role: Serves | None, order: Sequence[Leaf]) -> tuple[Value, str, str]:
-    """The command that rests, and the statuses that mean done and failed."""
+    """Return the command that rests, and the statuses that mean done and failed."""
     if role is None:
         return 0, DONE, FAILED
     return order[_place(order, COMMAND)].members.index(role.rest), role.done, role.failed
 
 
 def field_of(leaf: Leaf) -> str:
-    """The name of a leaf in its record: `command.target_mm` is `target_mm`; all of it where it is a variable of its own."""
+    """Return the name of a leaf in its record: `command.target_mm` is `target_mm`. A variable of its own keeps its whole name."""
     return leaf.name.partition(".")[2] or leaf.name
 
 

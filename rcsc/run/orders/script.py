@@ -35,7 +35,7 @@ MOST_ROWS, MOST_CYCLES = 100_000, 10_000_000
 
 
 class BadScript(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """The script cannot be read; says every row that is wrong."""
+    """A script that cannot be read; lists every wrong row."""
 
     code = Code.BAD_SCRIPT
 
@@ -68,7 +68,7 @@ class OrderRow:
 
     @property
     def timed(self) -> bool:
-        """Whether it takes so many cycles, whatever is reported."""
+        """True for a row that takes a fixed number of cycles, whatever is reported."""
         return self.cycles is not None
 
 
@@ -80,14 +80,14 @@ class OutsideBuffer:
     leaves: tuple[Leaf, ...]
 
     def place(self, column: str) -> int | None:
-        """Which of its leaves a column names; None for none."""
+        """Return the position of the leaf that a column names; None for none."""
         inner = column.removeprefix(self.name)
         names = [self._part(leaf) for leaf in self.leaves]
         return names.index(inner) if column.startswith(self.name) and inner in names else None
 
     @property
     def columns(self) -> list[str]:
-        """What its leaves are called in a script."""
+        """The names of its leaves in a script."""
         return [f"{self.name}{self._part(leaf)}" for leaf in self.leaves]
 
     def _part(self, leaf: Leaf) -> str:
@@ -101,7 +101,7 @@ class OutsideBuffer:
 
 
 def outside_buffers(system: Description, signs: Mapping[str, Signature]) -> tuple[OutsideBuffer, ...]:
-    """The buffers from outside to a level."""
+    """Return the buffers from outside to a level."""
     buffers = []
     for wire in system.wires:
         level, _, variable = wire.target.partition(".")
@@ -112,7 +112,7 @@ def outside_buffers(system: Description, signs: Mapping[str, Signature]) -> tupl
 
 
 def script_path(name: str, folder: Path) -> Path:
-    """The file that a name means: itself, or one of those beside the description or in `scripts` there."""
+    """Find the file that a name means: itself, or one beside the description or in `scripts` there."""
     path = Path(name)
     if path.suffix in {".csv", ".toml"} or path.is_file():
         return path if path.is_file() or not (folder / path).is_file() else folder / path
@@ -123,7 +123,7 @@ def script_path(name: str, folder: Path) -> Path:
 def read_script(
     path: Path, system: Description, signs: Mapping[str, Signature], faults: Sequence[str] = ()
 ) -> tuple[OrderRow, ...]:
-    """The rows of a script.
+    """Read the rows of a script.
 
     Args:
         path: The file.
@@ -182,7 +182,7 @@ class _Reader:
     faults: tuple[str, ...]
 
     def check_columns(self, lines: Sequence[Mapping[str, str]]) -> Iterator[str]:
-        """What is wrong with the names of columns."""
+        """Yield the errors in the names of columns."""
         fields = [field_of(leaf) for level in self.levels for leaf in level.order_leaves]
         known = {*OWN, *(name for name in fields if name not in PROTOCOL)}
         known |= {column for buffer in self.buffers for column in buffer.columns}
@@ -192,10 +192,10 @@ class _Reader:
                 yield f"no order has a field `{name}`, and no buffer from outside is called so{near}"
 
     def row(self, number: int, line: Mapping[str, str]) -> OrderRow:
-        """A row.
+        """Read a row.
 
         Raises:
-            ValueError: It says what cannot be.
+            ValueError: The row has an error.
         """
         shown = " ".join(
             cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items()
@@ -258,7 +258,7 @@ class _Reader:
 
 
 def _order(level: Served, line: Mapping[str, str]) -> tuple[Value, ...]:
-    """The fields of an order but its number, as the row says them."""
+    """Return the fields of an order but its number, with the values that the row gives."""
     command = level.order_leaves[level.command]
     columns = {name: COMMAND if leaf is command else name for name, leaf in level.fields.items()}
     return level.order_with(
@@ -267,10 +267,10 @@ def _order(level: Served, line: Mapping[str, str]) -> tuple[Value, ...]:
 
 
 def _read(leaf: Leaf, cell: str, column: str) -> Value:
-    """The value that a cell means.
+    """Read the value of a cell.
 
     Raises:
-        ValueError: It is none of the leaf's.
+        ValueError: The cell is no value of the leaf.
     """
     try:
         value = leaf.read(cell)

@@ -31,7 +31,7 @@ LATEST_TICK = 2**40
 
 
 class NotResumed(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """There is nothing to go on from; says why. Nothing has moved."""
+    """A stopped run that cannot be continued, with the reason. Nothing has moved."""
 
     helps = ("`--from-row N` begins anew at row N",)
 
@@ -42,14 +42,14 @@ class NotResumed(CodedError):  # noqa: N818  # what happened, not an error of ou
 
 @runtime_checkable
 class Restorable(Protocol):
-    """Something outside that can be put back; a real plant cannot, and is where it is."""
+    """A part outside that can be put back; a real plant cannot, and is where it is."""
 
     def state(self) -> dict[str, Any]:
-        """Its state in plain values: what JSON keeps exactly."""
+        """Return its state in plain values, which JSON keeps exactly."""
         ...
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes a state.
+        """Put back a state.
 
         Raises:
             ValueError: It is no state of its kind.
@@ -58,12 +58,12 @@ class Restorable(Protocol):
 
 
 class NotKept(Exception):  # noqa: N818  # likewise
-    """What stands outside has something that no file holds; says what."""
+    """A part outside with a value that no file holds; names it."""
 
 
 @runtime_checkable
 class RestorableOperator(Restorable, Protocol):
-    """Somebody who gives orders, and can be put back."""
+    """An operator that can be put back."""
 
     @property
     def rows(self) -> Sequence[ScriptRow]:
@@ -72,13 +72,13 @@ class RestorableOperator(Restorable, Protocol):
 
 
 def stopped_path(system: Description) -> Path:
-    """Where a stopped run of the system is kept."""
+    """Return the path where a stopped run of the system is kept."""
     return system.database.parent / ".rcsc-cache" / f"{system.name}.stopped.json"
 
 
 @dataclass(frozen=True, slots=True)
 class StoppedRuns:
-    """Keeps a stopped run of a system, and goes on from it.
+    """Keeps a stopped run of a system, and continues it.
 
     Attributes:
         places: What numbers in the levels' states stand for outside, by name: where they have changed nothing goes on.
@@ -90,7 +90,7 @@ class StoppedRuns:
     between: Mapping[str, Any] = field(default_factory=dict)
 
     def keep(self, run: ScriptedRun, script: str) -> Path:
-        """Saves where the run stands.
+        """Save the state of a stopped run.
 
         Args:
             run: Its script was stopped, and its level rests.
@@ -98,7 +98,7 @@ class StoppedRuns:
 
         Raises:
             OSError: It could not be written.
-            NotKept: Something outside cannot be.
+            NotKept: A part outside has a value that no file holds.
         """
         operator, system = _operator(run), run.system
         stopped: dict[str, Any] = {
@@ -124,15 +124,15 @@ class StoppedRuns:
         return path
 
     def forget(self) -> None:
-        """Removes what was kept: the system has moved on. Where nothing can be removed, nothing was kept, either."""
+        """Remove the kept run: the system has moved on. Where nothing can be removed, nothing was kept, either."""
         with contextlib.suppress(OSError):
             stopped_path(self.system).unlink(missing_ok=True)
 
     def go_on(self, run: ScriptedRun) -> None:
-        """Puts a run that has not begun where the stopped one stood; its row is tried again.
+        """Put a run that has not begun into the state of the stopped one; its row is tried again.
 
         Raises:
-            NotResumed: There is nothing to go on from, or it is of another script, other tables or another plant.
+            NotResumed: No run was kept, or it is of another script, other tables or another plant.
         """
         stopped = _read(stopped_path(self.system))
         self._same(run, stopped)
@@ -142,7 +142,7 @@ class StoppedRuns:
             raise NotResumed(Code.BAD_SYSTEM, f"the stopped run is of another plant: {error}") from error
 
     def _same(self, run: ScriptedRun, stopped: "_Stopped") -> None:
-        """Refuses another script, other executors or other places."""
+        """Refuse another script, other executors or other places."""
         if stopped.rows != rows_digest(_operator(run).rows):
             raise NotResumed(
                 Code.NOT_RESUMED,
@@ -186,7 +186,7 @@ class StoppedRuns:
         system.tick = stopped.tick
 
     def _buffers(self) -> Iterator[str]:
-        """Names of all buffers that something may have been published in."""
+        """Yield the names of all buffers that may hold a published value."""
         yield from dict.fromkeys(wire.source for wire in self.system.wires)
         yield from self.between
 
@@ -207,7 +207,7 @@ def tables_digest(system: Description) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Stopped:
-    """What the file holds."""
+    """The content of the file."""
 
     form: Literal[2]
     script: str
@@ -261,10 +261,10 @@ def _values(level: RunningLevel, values: Sequence[Any]) -> tuple[Any, ...]:
 
 
 def _operator(run: ScriptedRun) -> RestorableOperator:
-    """Who gives the orders.
+    """Return the operator, if it can be put back.
 
     Raises:
-        NotResumed: Nobody does, or he cannot be put back.
+        NotResumed: There is no operator, or it cannot be put back.
     """
     operator: object = run.operator
     if isinstance(operator, RestorableOperator):
@@ -273,7 +273,7 @@ def _operator(run: ScriptedRun) -> RestorableOperator:
 
 
 def _restorable(run: ScriptedRun) -> Iterator[tuple[str, Restorable]]:
-    """Yield what stands outside and can be put back, by kind; a second of a kind is numbered. Who gives orders is apart."""
+    """Yield the parts outside that can be put back, by kind; a second of a kind is numbered. The operator is left out."""
     seen: dict[str, int] = {}
     operator: object = run.operator
     for part in run.system.outside:

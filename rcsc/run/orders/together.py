@@ -52,22 +52,22 @@ class Together:
 
     @property
     def over(self) -> bool:
-        """Whether the script is at its end and its level rests, or a plant says that it is over."""
+        """True once the script has ended and its level rests, or a plant says that the run is over."""
         ended = self.operator is not None and self.operator.over and self.operator.at_rest
         return ended or any(getattr(plant, "over", False) for plant in self.others)
 
     def space(self) -> Any:
-        """How a plant looks in space (`rcsc.run.plant.space`); None where none says so."""
+        """Return the first space of a plant (`rcsc.run.plant.space`); None where no plant has one."""
         offered = (getattr(plant, "space", None) for plant in self.others)
         return next((space for ask in offered if ask is not None and (space := ask()) is not None), None)
 
     @property
     def pictures(self) -> Mapping[str, Callable[[], str]]:
-        """How plants look, by kind of picture."""
+        """The functions that draw the plants, by kind of picture."""
         return {kind: draw for plant in self.others for kind, draw in getattr(plant, "pictures", {}).items()}
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One tick of all: each sees what the tick before left."""
+        """Run one tick of all parts: each sees the buffers as the tick before left them."""
 
         def seen(name: str) -> Values | None:
             return latest(name) if name in self.shared else self._between.get(name)
@@ -81,10 +81,10 @@ class Together:
         return self._with_row(shared)
 
     def state(self) -> dict[str, Any]:
-        """What stands outside but the operator, in plain values.
+        """Return the state outside but for the operator's, in plain values.
 
         Raises:
-            NotKept: A plant has something that no file holds.
+            NotKept: A plant has a value that no file holds.
         """
         return {
             "between": {name: list(values) for name, values in self._between.items()},
@@ -93,10 +93,10 @@ class Together:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Puts back a state.
+        """Put back a state.
 
         Raises:
-            ValueError: It is none of these plants.
+            ValueError: The state is none of these plants.
         """
         held: _State = read(_State, state)
         plants = self._plants()
@@ -114,7 +114,7 @@ class Together:
         return [plant for plant in self.others if isinstance(plant, Restorable)]
 
     def _with_row(self, published: dict[str, Values]) -> dict[str, Values]:
-        """What is published, with the values that the row under way sets."""
+        """Return the published values, with those that the row under way sets."""
         held = self.operator.held if isinstance(self.operator, ScriptOperator) else {}
         for name, values in held.items():
             base = published.get(name, self._set.get(name, self.first[name]))
@@ -128,11 +128,11 @@ class Together:
         return faults_of(self.others)
 
     def switch(self, fault: str, *, on: bool) -> None:
-        """Switches a fault on or off."""
+        """Switch a fault on or off."""
         switch(self.others, fault, on=on)
 
     def _switch(self) -> None:
-        """Switches on what the row under way wants, and off what the one before wanted."""
+        """Switch on the faults of the row under way, and off those of the row before."""
         wanted = self.operator.faults if isinstance(self.operator, ScriptOperator) else frozenset()
         for fault in sorted(self._on ^ wanted):
             switch(self.others, fault, on=fault in wanted)

@@ -46,10 +46,10 @@ __all__ = ["Fault", "Plant", "Property", "Range"]
 
 
 class Plant(Protocol):
-    """What every plant has; no plant needs to name it."""
+    """The interface of every plant; no plant needs to name it."""
 
     def step(self, seconds: float) -> None:
-        """One tick: read the attributes that levels give, and set those that levels read.
+        """Run one tick: read the attributes that levels give, and set those that levels read.
 
         Args:
             seconds: Of a tick: `tick_ms` of the description.

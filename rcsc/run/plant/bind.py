@@ -81,7 +81,7 @@ class BoundPlant:
     seconds: float
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "BoundPlant":
-        """The plant as it is now; what it is bound to never changes.
+        """Copy the plant as it is now; share its bindings, which never change.
 
         Raises:
             PlantFailed: It cannot be copied.
@@ -91,21 +91,21 @@ class BoundPlant:
 
     @property
     def over(self) -> bool:
-        """Whether the plant says that the run is at its end.
+        """True once the plant reports the end of the run.
 
         Raises:
-            PlantFailed: It raised.
+            PlantFailed: The plant raised.
         """
         with told("the plant's `over` failed"):
             return bool(getattr(self.plant, "over", False))
 
     @property
     def pictures(self) -> dict[str, Callable[[], str]]:
-        """How it looks, by kind of picture; empty where its class has no `picture`."""
+        """The functions that draw the plant, by kind of picture; empty where its class has no `picture`."""
         return {"plant": self._drawn} if callable(getattr(self.plant, "picture", None)) else {}
 
     def space(self) -> Space | None:
-        """How it looks in space; None where its class has no method `space`.
+        """Return the plant's scene in space; None where its class has no method `space`.
 
         Raises:
             PlantFailed: The method raised.
@@ -118,7 +118,7 @@ class BoundPlant:
             return space
 
     def _drawn(self) -> str:
-        """An SVG document.
+        """Draw the plant as an SVG document.
 
         Raises:
             PlantFailed: `picture` raised, or gave something else.
@@ -134,26 +134,26 @@ class BoundPlant:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """The names of its switches, fields of type `Fault`."""
+        """The names of its fault switches: fields of type `Fault`."""
         return fields.faults(type(self.plant))
 
     def switch(self, fault: str, *, on: bool) -> None:
-        """Switches a fault on or off."""
+        """Switch a fault on or off."""
         setattr(self.plant, fault, on)
 
     def state(self) -> dict[str, Any]:
-        """The plant's state, in plain values: what its own `state()` gives, else its attributes but for its faults.
+        """Return the plant's state in plain values: the result of its own `state()`, else its attributes without its faults.
 
         Raises:
-            NotKept: It has something that no file holds.
+            NotKept: The plant has a value that no file holds.
         """
         return {"plant": held_of(self.plant, self.faults)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Puts back a state.
+        """Put back a state.
 
         Raises:
-            ValueError: It is none of this class.
+            ValueError: The state is none of this class.
         """
         if set(state) != {"plant"}:
             raise ValueError("not the state of a plant")
@@ -161,11 +161,11 @@ class BoundPlant:
 
     @property
     def properties(self) -> tuple[str, ...]:
-        """The names of its own properties, methods whose result is a `Property`."""
+        """The names of its own properties: methods whose result is a `Property`."""
         return fields.properties(type(self.plant))
 
     def shown(self) -> str:
-        """Its fields as they are now, for whoever reports on it."""
+        """Return its fields and their present values, for a report."""
         bound = [*self.takes, *self.gives]
         return ", ".join(f"{buffer.end} = {self._field(buffer)}" for buffer, _ in bound)
 
@@ -176,7 +176,7 @@ class BoundPlant:
         return value
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
-        """One tick: fields from the levels, the plant's `step`, fields to the levels.
+        """Run one tick: set fields from the levels, call the plant's `step`, give fields to the levels.
 
         Raises:
             PlantFailed: The plant raised, or a field has a value that its buffer cannot hold.
@@ -218,10 +218,10 @@ class BoundPlant:
 
 @contextmanager
 def told(what: str) -> Iterator[None]:
-    """Whatever a user's code raises, told as what the plant did.
+    """Report any exception of a user's code as a failure of the plant.
 
     Raises:
-        PlantFailed: It raised.
+        PlantFailed: The code raised.
     """
     try:
         yield
@@ -230,7 +230,7 @@ def told(what: str) -> Iterator[None]:
 
 
 def raised(error: BaseException) -> str:
-    """What a user's code raised, and where: `ZeroDivisionError: division by zero (plant.py, line 12)`."""
+    """Return the exception of a user's code, and its place: `ZeroDivisionError: division by zero (plant.py, line 12)`."""
     frames = traceback.extract_tb(error.__traceback__)
     message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
@@ -243,7 +243,7 @@ def raised(error: BaseException) -> str:
 
 
 def parties_of(system: Description, signs: Mapping[str, Signature], spec: PlantSpec) -> tuple[str, ...]:
-    """Whom a plant stands for: as it says, else everybody outside who orders no level."""
+    """Return the parties that a plant stands for: those that it names, else all outside that order no level."""
     if spec.parties is not None:
         return spec.parties
     order = {level.party for level in served(system, signs)}
@@ -254,7 +254,7 @@ def parties_of(system: Description, signs: Mapping[str, Signature], spec: PlantS
 def buffers_of(
     system: Description, signs: Mapping[str, Signature], parties: Sequence[str]
 ) -> tuple[Buffer, ...]:
-    """The buffers between the levels and these parties, with the field that each has on their side."""
+    """Return the buffers between the levels and these parties, with the plant's field of each."""
     buffers = []
     for wire in system.wires:
         for end, other, gives in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
@@ -283,7 +283,7 @@ def bind(
     of: type,
     seed: int = 0,
 ) -> BoundPlant:
-    """An object of a plant's class, bound to the buffers of a system.
+    """Make an object of a plant's class, and bind it to the buffers of a system.
 
     Raises:
         BadPlant: The class does not fit; everything that does not is told, each at its buffer's line.
@@ -316,7 +316,7 @@ def bind(
 
 
 def plant_page(system: Description) -> Document:
-    """A page for what is wrong with a plant, with the places of the description."""
+    """Return a page for findings about a plant, with the places of the description."""
     return replace(system.review(), code=Code.BAD_PLANT)
 
 
@@ -327,7 +327,7 @@ def _check_parties(
     spec: PlantSpec,
     parties: Sequence[str],
 ) -> None:
-    """Note parties that no buffer has, and that there is none at all."""
+    """Note parties that no buffer has, and a plant without any party."""
     known = list(dict.fromkeys(e.partition(".")[0] for w in system.wires for e in (w.source, w.target)))
     outside = [party for party in known if party not in signs]
     for at, party in enumerate(spec.parties or ()):
@@ -346,7 +346,7 @@ def _check_parties(
 
 
 def _bound(page: Document, buffer: Buffer, of: type, hints: Mapping[str, Any]) -> tuple[Buffer, Link] | None:
-    """A buffer and its link; None where it does not fit, which is noted."""
+    """Return a buffer and its link; where it does not fit, note that and return None."""
     field = buffer.field if buffer.field[0] in hints else buffer.field[1:]
     misfits: list[Misfit] = []
     field_link: Link | None = None
@@ -396,7 +396,7 @@ def _party(buffer: Buffer) -> str:
 
 
 def _suggested(leaves: Sequence[Leaf]) -> str:
-    """The annotation of a field for a scalar; for a record a word."""
+    """Return the annotation that fits a scalar; `...` for a record."""
     if len(leaves) > 1:
         return "..."
     [leaf] = leaves
@@ -406,11 +406,11 @@ def _suggested(leaves: Sequence[Leaf]) -> str:
 
 
 def _kind(of: type, hints: Mapping[str, Any], field: FieldPath) -> fields.FieldType:
-    """The type of a field.
+    """Return the type of a field.
 
     Raises:
-        KeyError: There is none: the class, the name, the names that it has.
-        NoField: It says nothing that a buffer could hold.
+        KeyError: The field does not exist; arguments: the class, the name, the names of its fields.
+        NoField: No buffer could hold its values.
     """
     owner, name = of.__name__, field[0]
     for at, name in enumerate(field):
@@ -426,7 +426,7 @@ def _kind(of: type, hints: Mapping[str, Any], field: FieldPath) -> fields.FieldT
 
 
 def line_of(of: type, field: str) -> str:
-    """Where a class declares a field: ` (plant.py:7)`; empty where that is not known."""
+    """Return the place where a class declares a field: ` (plant.py:7)`; empty where it is not known."""
     try:
         file, (text, first) = Path(inspect.getfile(of)).name, inspect.getsourcelines(of)
         body = ast.parse(inspect.cleandoc("\n" + "".join(text))).body[0]
@@ -458,10 +458,10 @@ def _check_step(page: Document, spec: PlantSpec, of: type) -> None:
 
 
 def _constructed(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
-    """An object of the class; one that takes a `seed` gets it.
+    """Construct an object of the class, with the `seed` where it takes one.
 
     Raises:
-        BadPlant: It cannot be made so.
+        BadPlant: The constructor failed.
     """
     try:
         parameters = inspect.signature(of).parameters
@@ -476,7 +476,7 @@ def _constructed(page: Document, spec: PlantSpec, of: type, seed: int) -> Any:
 
 
 def _prepare(page: Document, plant: Any, buffer: Buffer, to_field: Link) -> None:
-    """Has the object itself own the field, with the variable's first value where the class gives none.
+    """Make the object itself own the field, with the variable's first value where the class gives none.
 
     A class that cannot be made of the fields is noted here, and not found out while the system runs.
     """
@@ -499,7 +499,7 @@ def _put_first(plant: Any, buffer: Buffer, first: object) -> None:
 
 
 def _own(owner: Any, name: str) -> Any:
-    """An attribute, which no other object shares after this."""
+    """Return an attribute, and make it one that no other object shares."""
     held = getattr(owner, name, None)
     if held is None:
         kind = fields.field_type(fields.annotations(type(owner))[name])

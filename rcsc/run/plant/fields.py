@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What a number of a plant's can be: `Annotated[float, Range(0, 20, "m")]`.
+    """The range of a plant's number: `Annotated[float, Range(0, 20, "m")]`.
 
     Attributes:
         low: The least value; `high` the greatest; both included.
@@ -38,7 +38,7 @@ Fault: TypeAlias = Annotated[bool, FaultSwitch()]
 
 @dataclass(frozen=True, slots=True)
 class PropertyMark:
-    """Marks the result of a method that says whether all is as it must be; whoever tests the system asks it after each tick."""
+    """Marks the result of a method that tells whether a property holds; whoever tests the system asks it after each tick."""
 
 
 Property: TypeAlias = Annotated[bool, PropertyMark()]
@@ -87,11 +87,11 @@ FieldType: TypeAlias = Number | Flag | Members | Record | Elements
 
 
 class NoField(Exception):  # noqa: N818  # what happened, not an error of ours
-    """An annotation that says nothing that a buffer could hold; says which."""
+    """An annotation whose values no buffer could hold; names it."""
 
 
 def annotations(of: type) -> dict[str, Any]:
-    """The annotated attributes of a class, inherited ones too.
+    """Return the annotated attributes of a class, inherited ones too.
 
     Raises:
         NoField: An annotation names what is not defined.
@@ -103,7 +103,7 @@ def annotations(of: type) -> dict[str, Any]:
 
 
 def faults(of: type) -> tuple[str, ...]:
-    """The names of a plant's switches: fields of type `Fault`.
+    """Return the names of a plant's switches: fields of type `Fault`.
 
     Raises:
         NoField: As `annotations`.
@@ -112,13 +112,13 @@ def faults(of: type) -> tuple[str, ...]:
 
 
 def properties(of: type) -> tuple[str, ...]:
-    """The names of a plant's properties: methods whose result is declared as `Property`, in order of definition."""
+    """Return the names of a plant's properties: methods whose result is declared as `Property`, in order of definition."""
     methods = {name: method for base in reversed(of.__mro__) for name, method in vars(base).items()}
     return tuple(name for name, method in methods.items() if PropertyMark() in _notes(_result(method)))
 
 
 def _result(method: object) -> Any:
-    """What a method's result is declared as; None where that cannot be read."""
+    """Return the declared type of a method's result; None where it cannot be read."""
     try:
         return typing.get_type_hints(method, include_extras=True).get("return")
     except (NameError, TypeError, AttributeError):
@@ -126,7 +126,7 @@ def _result(method: object) -> Any:
 
 
 def shown(field: FieldType) -> str:
-    """The type as its author wrote it, for messages."""
+    """Return the type as its author wrote it, for messages."""
     match field:
         case Number(whole, _):
             return "int" if whole else "float"
@@ -145,10 +145,10 @@ def shown(field: FieldType) -> str:
 
 
 def field_type(hint: Any) -> FieldType:
-    """What an annotation says.
+    """Read an annotation as the type of a field.
 
     Raises:
-        NoField: Nothing that a buffer could hold.
+        NoField: No buffer could hold its values.
     """
     notes = _notes(hint)
     bare = typing.get_args(hint)[0] if typing.get_origin(hint) is Annotated else hint
@@ -199,7 +199,7 @@ def _spelled(hint: Any) -> str:
 
 
 def made_of(record: Record, values: Mapping[str, object]) -> object:
-    """An object of the record's class with these fields; others keep their defaults."""
+    """Make an object of the record's class with these fields; others keep their defaults."""
     if dataclasses.is_dataclass(record.make) or issubclass(record.make, tuple):
         return record.make(**values)
     instance = record.make()

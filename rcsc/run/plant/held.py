@@ -19,14 +19,14 @@ _NEW: Any = vars(copyreg)["__newobj__"]
 
 
 def held_of(plant: Any, leave: Collection[str] = ()) -> dict[str, Any]:
-    """What a plant holds.
+    """Return the state of a plant in plain form.
 
     Args:
         plant: The user's object.
         leave: Attributes that are no state of it: its faults.
 
     Raises:
-        NotKept: It holds what no file does; says which attribute.
+        NotKept: It has a value that no file holds; names the attribute.
     """
     if _says_itself(plant):
         state = plant.state()
@@ -41,7 +41,7 @@ def held_of(plant: Any, leave: Collection[str] = ()) -> dict[str, Any]:
 
 
 def put_back(plant: Any, state: Any, leave: Collection[str] = ()) -> None:
-    """Puts back what a plant held.
+    """Put back the state of a plant.
 
     Raises:
         ValueError: It is no state of such a plant.
@@ -64,7 +64,7 @@ def _says_itself(plant: Any) -> bool:
 
 
 def _plain(value: Any, where: str) -> Any:
-    """The value in plain form."""
+    """Return the value in plain form."""
     if isinstance(value, enum.Enum):
         return value.name
     if isinstance(value, PLAIN):
@@ -79,10 +79,10 @@ def _plain(value: Any, where: str) -> Any:
 
 
 def _attributes(value: Any, where: str) -> dict[str, Any]:
-    """The attributes of an object that holds nothing else.
+    """Return the attributes of an object that holds nothing else.
 
     Raises:
-        NotKept: It holds more, as a generator of random numbers does, or is none that has attributes.
+        NotKept: It holds more, as a generator of random numbers does, or has no attributes.
     """
     try:
         made = value.__reduce_ex__(2)  # what `copy` and `pickle` take an object to hold
@@ -96,7 +96,7 @@ def _attributes(value: Any, where: str) -> dict[str, Any]:
 
 
 def _restored(now: Any, then: Any) -> Any:
-    """What was held, in the form of what stands there now.
+    """Return a kept value in the form of the present one.
 
     Raises:
         ValueError: It has another form.
@@ -125,6 +125,6 @@ def _member(kind: type[enum.Enum], name: Any) -> enum.Enum:
 
 
 def _items(now: Any, then: list[Any]) -> list[Any]:
-    """Each in the form of what stands in its place; of a longer list in that of the last."""
+    """Restore each item in the form of the one in its place; those past the end in the form of the last."""
     forms = [*now[: len(then)], *([now[-1] if len(now) else None] * (len(then) - len(now)))]
     return [_restored(form, item) for form, item in zip(forms, then, strict=True)]

@@ -26,12 +26,12 @@ from rcsc.run.signature import Signature, Value, Values
 
 
 def by_hand(system: Description) -> str | None:
-    """The plant that is taken by hand when nobody says which; None where the description names none."""
+    """Return the name of the plant to operate by hand when nobody names one; None where the description has none."""
     return next((spec.name for spec in system.plants if spec.by_hand), None)
 
 
 def chosen(system: Description, wanted: str | None) -> PlantSpec | None:
-    """The plant that is meant: a file, a name of the description's, or its first; None where there is none.
+    """Find the plant: a file, a name of the description's, or its first; None where there is none.
 
     Raises:
         BadPlant: The description has none of that name.
@@ -65,7 +65,7 @@ def load(
     database: Path | None = None,
     answers_only: bool = False,
 ) -> Staged:
-    """What stands outside a system.
+    """Load the parts outside a system.
 
     Args:
         system: The description.
@@ -93,20 +93,20 @@ def load(
 
 
 def _of_a_model() -> StageFunction:
-    """Return what makes a plant of a MuJoCo model; the core needs no simulator."""
+    """Return the function that makes a plant of a MuJoCo model; the core needs no simulator."""
     from rcsc.run.plant.models.model_plant import staged  # keep lazy: of an extra
 
     return staged
 
 
 def _queries(system: Description, bound: BoundPlant) -> dict[str, Query]:
-    """The plant's methods that are named as what feeds ask; what it does not answer is told when a level needs it."""
+    """Return the plant's methods that answer the queries of feeds; a query without one is reported when a level needs it."""
     asked = {feed.query for spec in system.levels for feed in spec.feeds}
     return {name: _query(bound.plant, name) for name in asked if callable(getattr(bound.plant, name, None))}
 
 
 def _query(plant: Any, name: str) -> Query:
-    """Return the answers of a plant's method; what is wrong with one is told as the plant's failure."""
+    """Return a query that calls a plant's method; a bad answer is reported as the plant's failure."""
 
     def query(*keys: Value) -> Values:
         with told(f"the plant failed, asked for `{name}`"):
@@ -117,7 +117,7 @@ def _query(plant: Any, name: str) -> Query:
 
 
 def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:
-    """The class, or what stages everything, that a plant names.
+    """Find the class, or the staging function, that a plant names.
 
     Args:
         system: The description.
@@ -125,7 +125,7 @@ def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:
         given: Whether the user names the file, from where one stands.
 
     Raises:
-        BadPlant: There is none.
+        BadPlant: There is no such class or function.
     """
     file, _, name = spec.python.partition(":")
     if not file.endswith(".py"):
@@ -158,17 +158,17 @@ def _factory(system: Description, spec: PlantSpec, *, given: bool) -> Any:
 
 
 def _classes(module: ModuleType) -> list[str]:
-    """The classes that a module itself defines."""
+    """Return the classes that a module itself defines."""
     return [
         name for name, of in inspect.getmembers(module, inspect.isclass) if of.__module__ == module.__name__
     ]
 
 
 def _imported(system: Description, path: Path, place: KeyPath) -> ModuleType:
-    """The module of a file; what stands beside it can be imported by it.
+    """Import the module of a file, which can import modules beside it.
 
     Raises:
-        BadPlant: It cannot be.
+        BadPlant: The file cannot be imported.
     """
     page = plant_page(system)
     place_of_file = sha256(str(path.resolve()).encode()).hexdigest()[:16]
@@ -191,20 +191,20 @@ def _imported(system: Description, path: Path, place: KeyPath) -> ModuleType:
 
 
 def named(system: Description, spec: PlantSpec, name: str, key: str = "python") -> Any:
-    """What `MODULE:NAME` names, of an installed package.
+    """Find the object that `MODULE:NAME` names, of an installed package.
 
     Raises:
-        BadPlant: There is no such thing.
+        BadPlant: There is no such object.
     """
     place, helps = (*spec.path, key), "write `FILE.py:CLASS`, or `MODULE:NAME`"
     return installed(plant_page(system), place, name, helps, BadPlant)
 
 
 def installed(page: Document, place: KeyPath, name: str, helps: str, bad: type[BadFile]) -> Any:
-    """Return what `MODULE:NAME` names, of an installed package.
+    """Find the object that `MODULE:NAME` names, of an installed package.
 
     Raises:
-        BadFile: There is no such thing: `bad`, at this place of the page.
+        BadFile: There is no such object: `bad`, at this place of the page.
     """
     module, _, attribute = name.partition(":")
     try:

@@ -28,7 +28,7 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Something rigid that is seen.
+    """A visible rigid part.
 
     Attributes:
         name: As its maker calls it; may be empty.
@@ -55,21 +55,21 @@ class Space(Protocol):
 
     @property
     def bodies(self) -> Sequence[str]:
-        """The names of what moves."""
+        """The names of the moving bodies."""
         ...
 
     @property
     def shapes(self) -> Sequence[Shape]:
-        """Everything that is seen; the same for as long as the plant lives."""
+        """All visible shapes; the same for as long as the plant lives."""
         ...
 
     def poses(self) -> Sequence[float]:
-        """Where the bodies are now, seven numbers each: x, y, z in metres, then the turn."""
+        """Return the poses of the bodies now, seven numbers each: x, y, z in metres, then the turn."""
         ...
 
 
 def space_of(outside: Iterable[object]) -> Space | None:
-    """Return the first space that something outside offers; None where nothing does."""
+    """Return the first space that a part outside offers; None where none does."""
     for part in outside:
         offered = getattr(part, "space", None)
         space: Space | None = offered() if callable(offered) else None

@@ -17,7 +17,7 @@ from rcsc.run.system import Outside
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What a plant is made for.
+    """The values that a plant is made from.
 
     Attributes:
         system: The description; `signs` the signatures of its levels, by name.
@@ -39,7 +39,7 @@ class Setup:
 
 @dataclass(frozen=True, slots=True)
 class Staged:
-    """What stands outside a system, ready for its first tick.
+    """The parts outside a system, ready for their first tick.
 
     Attributes:
         outside: In the order in which they step.
@@ -59,12 +59,12 @@ class Staged:
 
     @property
     def over(self) -> bool:
-        """Whether something outside says that the run is at its end."""
+        """True once a part outside reports the end of the run."""
         return any(getattr(part, "over", False) for part in self.outside)
 
     @property
     def plants(self) -> tuple[BoundPlant, ...]:
-        """The plants among them whose fields are bound."""
+        """The plants among the parts whose fields are bound."""
         return tuple(part for part in self.outside if isinstance(part, BoundPlant))
 
 

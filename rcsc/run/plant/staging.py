@@ -24,7 +24,7 @@ from rcsc.run.system import Outside, signatures
 
 @dataclass(frozen=True, slots=True)
 class StageOrder:
-    """Which system, plant and script are meant, in words that travel to a process.
+    """A system, a plant and a script, named in words that travel to a process.
 
     Attributes:
         system: The description's path.
@@ -45,7 +45,7 @@ class StageOrder:
 def staged(
     order: StageOrder, system: Description, signs: Mapping[str, Signature], *, answers_only: bool = False
 ) -> Staged:
-    """What stands outside; of a plant that reads no scripts itself, with the operator of this one.
+    """Stage the parts outside; for a plant that reads no scripts itself, add an operator of this script.
 
     Raises:
         CodedError: Plant or script is not in order.
@@ -70,7 +70,7 @@ def staged(
 def together(
     stage: Staged, system: Description, signs: Mapping[str, Signature], results: Path | None = None
 ) -> Together:
-    """All that stands outside as one."""
+    """Join all parts outside into one."""
     first = {
         buffer.name: tuple(leaf.initial for leaf in buffer.leaves)
         for buffer in outside_buffers(system, signs)
@@ -80,14 +80,14 @@ def together(
 
 
 def standing(stage: Staged, system: Description, signs: Mapping[str, Signature]) -> tuple[Outside, ...]:
-    """What stands outside in one process; a plant that reads its own scripts knows what its parts say to each other."""
+    """Return the parts outside in one process; a plant that reads its own scripts knows what its parts say to each other."""
     if stage.operator is None or isinstance(stage.operator, ScriptOperator):
         return (together(stage, system, signs),)
     return (stage.operator, *stage.outside)
 
 
 def outside(order: StageOrder, results: str, first: int = 0) -> list[Outside]:
-    """Operator and plants, for a process.
+    """Make the operator and the plants, for a process.
 
     Args:
         order: Which.
@@ -103,6 +103,6 @@ def outside(order: StageOrder, results: str, first: int = 0) -> list[Outside]:
 
 
 def queries(order: StageOrder) -> dict[str, Query]:
-    """The answers to what feeds ask, for a level's process."""
+    """Return the answers to the queries of feeds, for a level's process."""
     system = description(Path(order.system))
     return dict(staged(order, system, signatures(system), answers_only=True).queries)

@@ -24,19 +24,19 @@ class Factor:
     pi: int = 0
 
     def times(self, number: float) -> Fraction | float:
-        """A finite number times the factor: exact where there is no pi in it."""
+        """Multiply a finite number by the factor: exactly where there is no pi in it."""
         if self.pi == 0:
             return Fraction(number) * self.fraction
         return number * float(self.fraction) * math.pi**self.pi
 
     @property
     def inverse(self) -> "Factor":
-        """The factor the other way."""
+        """The factor of the opposite conversion."""
         return Factor(1 / self.fraction, -self.pi)
 
     @property
     def is_one(self) -> bool:
-        """Whether both units are the same."""
+        """True if both units are the same."""
         return self.fraction == 1 and self.pi == 0
 
 
@@ -59,7 +59,7 @@ _KNOWN: dict[str, tuple[Factor, dict[str, int]]] = {
 
 
 def factor(unit: str, into: str) -> Factor | None:
-    """What one of `unit` is in `into`; None where they measure different things.
+    """Return the size of one `unit` in `into`; None where they measure different things.
 
     A unit that only the user's tables know equals itself.
 
@@ -73,10 +73,10 @@ def factor(unit: str, into: str) -> Factor | None:
 
 
 def _parsed(unit: str) -> tuple[Factor, dict[str, int]]:
-    """The size of a unit in base units, and their powers.
+    """Return the size of a unit in base units, and their powers.
 
     Raises:
-        ValueError: It is none.
+        ValueError: The text is no unit.
     """
     fraction, pi, powers = Fraction(1), 0, Counter[str]()
     at, text = 0, unit.strip()

@@ -29,7 +29,7 @@ class BadValue(ValueError):  # noqa: N818  # what happened, not an error of ours
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Something that does not fit: where in the field, what is wrong, what would help."""
+    """A misfit between field and variable: the place in the field, the reason, and helps."""
 
     place: str
     message: str
@@ -37,14 +37,14 @@ class Misfit:
 
 
 class Link(Protocol):
-    """What connects a field with leaves that lie next to each other."""
+    """A connection between a field and leaves that lie next to each other."""
 
     def taken(self, values: Iterator[Value]) -> object:
-        """The field's value, of the next values of the leaves."""
+        """Return the field's value, of the next values of the leaves."""
         ...
 
     def given(self, value: Any) -> Iterator[Value]:
-        """The values of the leaves.
+        """Yield the values of the leaves.
 
         Raises:
             BadValue: The field has no such value.
@@ -64,7 +64,7 @@ class Shape:
 
 
 def shape(leaves: Sequence[Leaf], variable: str) -> Shape:
-    """The shape of a variable whose leaves these are."""
+    """Build the shape of the variable that has these leaves."""
     root = Shape()
     for leaf in leaves:
         node = root
@@ -82,11 +82,11 @@ class FlagLink:
     """A bool."""
 
     def taken(self, values: Iterator[Value]) -> bool:
-        """As it is."""
+        """Return the next value as it is."""
         return bool(next(values))
 
     def given(self, value: Any) -> Iterator[Value]:
-        """As it is; numpy's bools are bools, too."""
+        """Yield the bool as it is; numpy's bools are bools, too."""
         if type(value).__name__ not in {"bool", "bool_"}:
             raise BadValue("", f"is {_shown(value)}, which is no bool")
         yield bool(value)
@@ -100,12 +100,12 @@ class MemberLink:
     of: fields.Members
 
     def taken(self, values: Iterator[Value]) -> object:
-        """Its name, or the `Enum`'s member of that name."""
+        """Return the member's name, or the `Enum`'s member of that name."""
         name = self.leaf.members[int(next(values))]
         return name if self.of.of is None else self.of.of[name]
 
     def given(self, value: Any) -> Iterator[Value]:
-        """Its number."""
+        """Yield the member's number."""
         name = getattr(value, "name", value)
         if name not in self.leaf.members:
             near = "".join(f"; {suggestion}" for suggestion in nearest(str(name), self.leaf.members))
@@ -126,14 +126,14 @@ class NumberLink:
     factor: Factor
 
     def taken(self, values: Iterator[Value]) -> Value:
-        """In the field's unit; a whole field has the variable's."""
+        """Return the number in the field's unit; a whole field has the variable's."""
         value = next(values)
         if self.whole:
             return int(value)
         return float(value if self.factor.is_one else _times(self.factor.inverse, value))
 
     def given(self, value: Any) -> Iterator[Value]:
-        """In the variable's unit; rounded and clamped where the variable is so."""
+        """Yield the number in the variable's unit, rounded for a whole variable and clamped where it is declared so."""
         try:
             number = value if isinstance(value, int) and not isinstance(value, bool) else float(value)
         except (TypeError, ValueError, OverflowError):
@@ -151,7 +151,7 @@ class NumberLink:
             raise BadValue("", f"is {_shown(value)}, which no float holds") from None
 
     def _held(self, number: int) -> int:
-        """A whole number that the variable's C type holds."""
+        """Clamp a whole number where the variable is declared so; else check that its C type holds it."""
         low, high = c_range(self.leaf)
         if self.leaf.clamp and self.leaf.low is not None and self.leaf.high is not None:
             return int(min(max(number, self.leaf.low), self.leaf.high))
@@ -170,11 +170,11 @@ class RecordLink:
     parts: Mapping[str, Link]
 
     def taken(self, values: Iterator[Value]) -> object:
-        """A new object of the class."""
+        """Make a new object of the class."""
         return fields.made_of(self.record, {name: part.taken(values) for name, part in self.parts.items()})
 
     def given(self, value: Any) -> Iterator[Value]:
-        """The values of its fields in the variable's order."""
+        """Yield the values of its fields in the variable's order."""
         for name, part in self.parts.items():
             if not hasattr(value, name):
                 raise BadValue("", f"is {_shown(value)}, which has no `{name}`")
@@ -189,11 +189,11 @@ class ElementsLink:
     parts: tuple[Link, ...]
 
     def taken(self, values: Iterator[Value]) -> object:
-        """A new list or tuple."""
+        """Make a new list or tuple."""
         return self.make([part.taken(values) for part in self.parts])
 
     def given(self, value: Any) -> Iterator[Value]:
-        """The values of the elements."""
+        """Yield the values of the elements."""
         try:
             elements = list(islice(value, len(self.parts) + 1))  # there may be no end of them
         except TypeError:
@@ -219,7 +219,7 @@ def _at(place: str, part: Link, value: Any) -> Iterator[Value]:
 def link(
     parts: Shape, of: fields.FieldType, misfits: list[Misfit], *, gives: bool, place: str = ""
 ) -> Link | None:
-    """A link between a variable and a field, or None and what does not fit.
+    """Link a variable and a field; return None where they do not fit, and note the misfits.
 
     Args:
         parts: The variable.
@@ -295,7 +295,7 @@ def _scalar(leaf: Leaf, of: fields.FieldType) -> Link:
 
 
 def _misfit(leaf: Leaf, of: fields.FieldType, *, gives: bool) -> tuple[str, tuple[str, ...]] | None:
-    """What is wrong with a scalar, and what would help."""
+    """Return the misfit of a scalar, and its helps; None where it fits."""
     wanted = "bool" if leaf.c_type == "bool" else "float" if leaf.c_type in REALS else "int"
     if leaf.members:
         return _members_misfit(leaf, of, gives=gives)
@@ -356,7 +356,7 @@ def _range_misfit(leaf: Leaf, of: fields.Number, *, gives: bool) -> tuple[str, t
 
 
 def c_range(leaf: Leaf) -> tuple[int, int]:
-    """What a whole number's C type holds."""
+    """Return the least and the greatest whole number of a C type."""
     bits, signed = C_BITS[leaf.c_type]
     return (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
 

@@ -26,7 +26,7 @@ _untracking = threading.Lock()
 
 @contextlib.contextmanager
 def _untracked() -> Iterator[None]:
-    """Keeps the resource tracker out: Python 3.13 has an argument for that, but not for `unlink`."""
+    """Keep the resource tracker out: Python 3.13 has an argument for that, but not for `unlink`."""
     with _untracking:
         held = [getattr(resource_tracker, name) for name in TRACKING]
         try:
@@ -39,7 +39,7 @@ def _untracked() -> Iterator[None]:
 
 
 def _nothing(_name: object, _kind: str) -> None:
-    """Tracks nothing."""
+    """Track nothing."""
 
 
 @dataclass(slots=True)
@@ -57,7 +57,7 @@ class Block:
     _lock: int = -1
 
     def __post_init__(self) -> None:
-        """Looks at the memory as bytes and as words."""
+        """Map the memory as bytes and as words."""
         assert self._memory.buf is not None  # it is open
         self._bytes = self._memory.buf
         # A whole multiple of eight bytes; a word of a cast view is stored by one instruction.
@@ -65,7 +65,7 @@ class Block:
 
     @classmethod
     def create(cls, size: int) -> Self:
-        """A new block of zeros; its maker removes it."""
+        """Make a new block of zeros; its maker removes it."""
         children.sweep(FOLDER, PREFIX)
         while True:
             name = f"{PREFIX}{os.getpid()}-{secrets.token_hex(6)}"
@@ -81,33 +81,33 @@ class Block:
 
     @classmethod
     def attach(cls, name: str) -> Self:
-        """The block of that name.
+        """Attach to the block of that name.
 
         Raises:
-            FileNotFoundError: There is none.
+            FileNotFoundError: There is no block of that name.
         """
         with _untracked():
             return cls(name, SharedMemory(name))
 
     def word(self, at: int) -> int:
-        """Eight bytes from `at`, a multiple of eight, read at once."""
+        """Read eight bytes from `at`, a multiple of eight, at once."""
         value: int = self._words[at >> 3]
         return value
 
     def set_word(self, at: int, value: int) -> None:
-        """Writes eight bytes from `at`, a multiple of eight, at once."""
+        """Write eight bytes from `at`, a multiple of eight, at once."""
         self._words[at >> 3] = value
 
     def read(self, at: int, size: int) -> bytes:
-        """Bytes from `at` on."""
+        """Return `size` bytes from `at` on."""
         return bytes(self._bytes[at : at + size])
 
     def write(self, at: int, image: bytes) -> None:
-        """Sets bytes from `at` on."""
+        """Write bytes from `at` on."""
         self._bytes[at : at + len(image)] = image
 
     def close(self) -> None:
-        """Lets go of it."""
+        """Detach from the block."""
         self._words.release()
         self._bytes.release()
         self._memory.close()
@@ -116,7 +116,7 @@ class Block:
             self._lock = -1
 
     def unlink(self) -> None:
-        """Removes it; who has it still sees it. Nothing, where another process did."""
+        """Remove the block; whoever has it attached still sees it. Do nothing where another process removed it."""
         with _untracked(), contextlib.suppress(FileNotFoundError):
             self._memory.unlink()
         children.let_go(FOLDER / self.name)

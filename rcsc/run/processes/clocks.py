@@ -51,21 +51,21 @@ class Clocks:
 
     @staticmethod
     def size(processes: int) -> int:
-        """Bytes that the clocks of so many processes take."""
+        """Return the number of bytes that the clocks of so many processes take."""
         return 2 * WORD * processes
 
     def start(self, name: str) -> None:
-        """Have others wait for a process from now on; one that ran before goes on where it stood."""
+        """Make the others wait for a process from now on; one that ran before goes on where it stood."""
         if self.block.word(self._places[name]) == ABSENT:
             self.set(name, 0)
 
     def now_ms(self, name: str) -> int | None:
-        """When a process's next cycle is, by the system's own time; None where it was never started."""
+        """Return the time of a process's next cycle, by the system's own time; None where it was never started."""
         word = self.block.word(self._places[name])
         return None if word == ABSENT else word - 1
 
     def set(self, name: str, now_ms: int) -> None:
-        """Say when a process's next cycle is."""
+        """Set the time of a process's next cycle."""
         self.block.set_word(self._places[name], now_ms + 1)
 
     def beat(self, name: str) -> None:
@@ -74,7 +74,7 @@ class Clocks:
         self.block.set_word(at, (self.block.word(at) + 1) % (1 << 64))
 
     def beats(self, name: str) -> int:
-        """A number that changes for as long as a process is alive and in no cycle."""
+        """Return a number that changes for as long as a process is alive and in no cycle."""
         return self.block.word(self._places[name] + WORD)
 
 
@@ -88,7 +88,7 @@ class Turn:
     """Who is not waited for, and where their clocks stood."""
 
     def done(self) -> None:
-        """A cycle has ended; the next is a period later."""
+        """End a cycle; the next is a period later."""
         self.clocks.set(self.name, self._now_ms + self.clocks.periods_ms[self.name])
 
     def wait(self, told: Sized = ()) -> None:
@@ -111,7 +111,7 @@ class Turn:
         return self.clocks.now_ms(self.name) or 0
 
     def _behind(self) -> dict[str, int]:
-        """The clocks of those that have to be waited for."""
+        """Return the clocks of the processes that this one has to wait for."""
         now_ms, behind = self._now_ms, {}
         for name, period_ms in self.clocks.periods_ms.items():
             other_ms = self.clocks.now_ms(name)
@@ -120,7 +120,7 @@ class Turn:
         return behind
 
     def _go_on_without(self, behind: Mapping[str, int]) -> None:
-        """Wait no longer for those that do not move; the time that they have lost is not made up for when they do."""
+        """Stop waiting for those that do not move; the time that they have lost is not made up for when they do."""
         self._left.update(behind)
         earliest_ms = min(other_ms + self.clocks.periods_ms[name] for name, other_ms in behind.items())
         self.clocks.set(self.name, earliest_ms)

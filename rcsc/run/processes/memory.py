@@ -38,7 +38,7 @@ STAMPS = 1 << 64
 
 
 class NotShared(Enum):
-    """Why there is no checkpoint."""
+    """The reason why there is no checkpoint."""
 
     BLANK = auto()  # the level has never run
     LOST = auto()  # it has, or somebody else wrote here: what is there is not believed
@@ -46,7 +46,7 @@ class NotShared(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SharedRegion:
-    """What one process writes in one commit.
+    """The region that one process writes in one commit.
 
     Attributes:
         at: First byte.
@@ -59,7 +59,7 @@ class SharedRegion:
     slot: int
 
     def place(self, stamp: int) -> int:
-        """First byte of the slot of a stamp."""
+        """Return the first byte of the slot of a stamp."""
         return self.at + LINE + (stamp & 1) * self.slot
 
 
@@ -81,7 +81,7 @@ class BufferPlace:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where everything lies; the same in every process.
+    """The places of all regions and buffers; the same in every process.
 
     Attributes:
         seed: Of the checksums, from the layout itself: what another layout wrote is not believed.
@@ -95,7 +95,7 @@ class Layout:
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """What a committed slot held."""
+    """The content of a committed slot."""
 
     stamp: int
     mask: int
@@ -103,7 +103,7 @@ class Image:
 
 
 def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
-    """The layout of a system.
+    """Lay out the shared memory of a system.
 
     Args:
         system: Levels and wires.
@@ -138,7 +138,7 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
 
 
 def _record(sign: Signature, variable: str) -> tuple[int, str]:
-    """Where a record begins in the canonical bytes, and its format."""
+    """Return the place of a record in the canonical bytes, and its format."""
     try:
         run = sign.record(variable)
     except KeyError as error:
@@ -173,7 +173,7 @@ class SharedMemoryBuffers:
 
     @classmethod
     def create(cls, layout: Layout, more: int = 0) -> Self:
-        """A new block in which no buffer holds anything, with so many bytes more after the layout's."""
+        """Make a new block of empty buffers, with so many bytes more after the layout's."""
         buffers = cls(Block.create(layout.size + more), layout)
         for name, region in layout.regions.items():
             buffers._commit(name, 0, bytes(region.packed.size))
@@ -181,15 +181,15 @@ class SharedMemoryBuffers:
 
     @classmethod
     def attach(cls, name: str, layout: Layout) -> Self:
-        """The block of that name.
+        """Attach to the block of that name.
 
         Raises:
-            FileNotFoundError: There is none.
+            FileNotFoundError: There is no block of that name.
         """
         return cls(Block.attach(name), layout)
 
     def publish(self, name: str, values: Values) -> None:
-        """Make this the latest value."""
+        """Publish this as the latest value."""
         place = self.layout.places[name]
         held = self._image(place.region)
         mask, payload = (
@@ -201,7 +201,7 @@ class SharedMemoryBuffers:
         self._commit(place.region, (mask | place.bit) & ~CHECKPOINT, payload[: place.first] + new + rest)
 
     def latest(self, name: str) -> Values | None:
-        """The latest value; None before the first. The same tuple, for as long as the value is the same."""
+        """Return the latest value; None before the first. The same tuple, for as long as the value is the same."""
         place = self.layout.places[name]
         held = self._image(place.region)
         known = self._read.get(name)
@@ -215,7 +215,7 @@ class SharedMemoryBuffers:
         return values
 
     def commit(self, level: str, values: Values) -> None:
-        """Makes this the level's checkpoint, and publishes every buffer that it gives, in one step.
+        """Make this the level's checkpoint, and publish every buffer that it gives, in one step.
 
         Args:
             level: Its name.
@@ -224,7 +224,7 @@ class SharedMemoryBuffers:
         self._commit(level, CHECKPOINT | (CHECKPOINT - 1), self.layout.regions[level].packed.pack(*values))
 
     def checkpoint(self, level: str) -> Values | NotShared:
-        """All leaves and the trace after the level's last cycle."""
+        """Return all leaves and the trace after the level's last cycle; else why there is no checkpoint."""
         self._images.pop(level, None)
         held = self._image(level)
         if held is not None and held.mask & CHECKPOINT:
@@ -233,7 +233,7 @@ class SharedMemoryBuffers:
         return NotShared.BLANK if held is not None and held.mask == 0 else NotShared.LOST
 
     def close(self) -> None:
-        """Lets go of the block."""
+        """Detach from the block."""
         self.block.close()
 
     def _commit(self, name: str, mask: int, payload: bytes) -> None:
@@ -250,7 +250,7 @@ class SharedMemoryBuffers:
         self._images[name] = Image(stamp, mask, payload)
 
     def _image(self, name: str) -> Image | None:
-        """The committed slot; None where nothing is to be believed."""
+        """Return the committed slot; None where it cannot be trusted."""
         region, known = self.layout.regions[name], self._images.get(name)
         for _ in range(TRIES):
             stamp = self.block.word(region.at)

@@ -36,20 +36,20 @@ HEED_S = 0.1
 
 
 class Transport(Buffers, Protocol):
-    """Buffers between processes, with checkpoints of the levels; what a network would have to do."""
+    """Buffers between processes, with checkpoints of the levels: the interface that a network would have to offer."""
 
     def commit(self, level: str, values: Values) -> None:
-        """Makes this the level's checkpoint, and publishes every buffer that it gives, in one step."""
+        """Make this the level's checkpoint, and publish every buffer that it gives, in one step."""
         ...
 
     def checkpoint(self, level: str) -> Values | NotShared:
-        """All leaves and the trace after the level's last cycle."""
+        """Return all leaves and the trace after the level's last cycle; else why there is no checkpoint."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Factory:
-    """What makes something in the process that needs it.
+    """A function that makes an object in the process that needs it.
 
     Attributes:
         name: `module:function`.
@@ -60,14 +60,14 @@ class Factory:
     arguments: tuple[Any, ...] = ()
 
     def make(self) -> Any:
-        """What the function returns."""
+        """Call the function and return its result."""
         module, _, function = self.name.partition(":")
         return getattr(importlib.import_module(module), function)(*self.arguments)
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What all processes of a system are told.
+    """The settings that all processes of a system share.
 
     Attributes:
         queries: Makes the database's questions by name.
@@ -98,7 +98,7 @@ class Paced:
     _due: float = field(default_factory=time.monotonic)
 
     def wait(self, told: Sized = ()) -> None:
-        """Until the next cycle is due, or not much longer than until something is `told`."""
+        """Wait until the next cycle is due, or not much longer than until something is `told`."""
         if self.period_s == 0:
             time.sleep(NAP_S)  # lets others run: there may be more processes than processors
             return
@@ -110,7 +110,7 @@ class Paced:
 
 
 def begin(level: RunningLevel, transport: Transport) -> None:
-    """Goes on from the last committed cycle; where that is lost, or ended in a fault, starts safely."""
+    """Continue from the last committed cycle; where that is lost, or ended in a fault, start safely."""
     held = transport.checkpoint(level.name)
     if held is NotShared.BLANK:
         return
@@ -121,7 +121,7 @@ def begin(level: RunningLevel, transport: Transport) -> None:
 
 
 def cycle(level: RunningLevel, transport: Transport) -> int:
-    """One cycle of a level; the fault, 0 for none."""
+    """Run one cycle of a level; return the fault, 0 for none."""
     level.take(transport)
     fault = level.run()
     transport.commit(level.name, level.values)
@@ -129,12 +129,12 @@ def cycle(level: RunningLevel, transport: Transport) -> int:
 
 
 def fault_of(sign: Signature, values: Values) -> int:
-    """The fault that a checkpoint ended in; 0 for none."""
+    """Return the fault in which a checkpoint ended; 0 for none."""
     return int(values[len(sign.leaves) + 1])
 
 
 def serve_level(setting: Setting, name: str, told: "Connection") -> None:
-    """A level's process, from its start to SIGTERM or a fault; what it was refused is sent."""
+    """Run a level's process, from its start to SIGTERM or a fault; send the reason of a refusal."""
     with _telling(told), _attached(setting) as (signs, transport):
         level = _level(setting, name, signs[name])
         begin(level, transport)
@@ -144,7 +144,7 @@ def serve_level(setting: Setting, name: str, told: "Connection") -> None:
 
 
 def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connection") -> None:
-    """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
+    """Run a process for the parts outside the levels, until one of them says `over`."""
     with _telling(told), _attached(setting) as (_, transport):
         parts: tuple[Outside, ...] = tuple(factory.make())
         for tick in _rounds(setting, name, transport):
@@ -164,7 +164,7 @@ def _publish(transport: Transport, name: str, values: Values) -> None:
 
 @contextlib.contextmanager
 def _telling(told: "Connection") -> Iterator[None]:
-    """Sends why a level was refused a state or values, and ends the process with `REFUSED`."""
+    """Send the reason why a level was refused a state or values, and end the process with `REFUSED`."""
     try:
         yield
     except StateTableError as error:

@@ -41,7 +41,7 @@ LOOP_CPU_S, WAIT_S = 5.0, 10.0
 
 @dataclass(slots=True)
 class _Pulse:
-    """When a process was last seen to do something.
+    """The time and the signs of a process's last activity.
 
     Attributes:
         stamp: Of its last commit, 0 for what has no region of its own; and how often it has looked whether its turn has come.
@@ -57,7 +57,7 @@ class _Pulse:
 
 
 class Supervisor:
-    """Processes of one system; a context: all run inside it, and nothing of them is left after it.
+    """The processes of one system. As a context: all run inside it, and none is left after it.
 
     Attributes:
         buffers: The shared memory, to look at and to prepare.
@@ -93,7 +93,7 @@ class Supervisor:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The processes: the levels from the top down, then what stands outside."""
+        """The names of the processes: the levels from the top down, then the parts outside."""
         return *self._signs, *self._outside
 
     def __enter__(self) -> Self:
@@ -109,10 +109,10 @@ class Supervisor:
         self.close()
 
     def start(self, name: str) -> None:
-        """Starts a process; again, if it has ended. Others wait for it, until `clocks.MOST_WAIT_S` are over.
+        """Start a process; again, if it has ended. Others wait for it, until `clocks.MOST_WAIT_S` are over.
 
         Raises:
-            ValueError: It runs.
+            ValueError: The process runs already.
         """
         if self.runs(name):
             raise ValueError(f"`{name}` runs")
@@ -133,27 +133,27 @@ class Supervisor:
         self._pulses.pop(name, None)
 
     def stop(self, name: str, how: signal.Signals = signal.SIGTERM) -> None:
-        """Ends a process: SIGTERM after its cycle, SIGKILL at once."""
+        """End a process: with SIGTERM after its cycle, with SIGKILL at once."""
         process = self._running[name]
         if process.pid is not None and process.is_alive():
             os.kill(process.pid, how)
         _ended(process, time.monotonic() + PATIENCE_S)
 
     def runs(self, name: str) -> bool:
-        """Whether it has been started and has not ended."""
+        """Tell whether a process has been started and has not ended."""
         return name in self._running and self._running[name].is_alive()
 
     def code(self, name: str) -> int | None:
-        """How it ended: 0 well, a negative number by that signal; None while it runs."""
+        """Return the exit code of a process: 0 well, a negative number by that signal; None while it runs."""
         return self._running[name].exitcode
 
     @property
     def over(self) -> bool:
-        """Whether something outside has come to its end."""
+        """True once a process outside the levels has ended well."""
         return any(self.code(name) == 0 for name in self._outside)
 
     def check(self) -> None:
-        """Looks for processes that ended by themselves.
+        """Check for processes that ended by themselves.
 
         Raises:
             StateTableError: A level met a fault, or was refused a state or values.
@@ -169,11 +169,11 @@ class Supervisor:
                 raise ChildProcessError(f"process `{name}` ended with code {code}")
 
     def killed(self) -> tuple[str, ...]:
-        """Processes that a signal ended."""
+        """Return the processes that a signal ended."""
         return tuple(name for name in self._running if (self.code(name) or 0) < 0)
 
     def still(self) -> dict[str, str]:
-        """Return the processes that run and stand still, and why: each was stopped, loops, or waits for something."""
+        """Return the running processes that stand still, and why: each was stopped, loops, or waits."""
         reasons = {name: self._why_still(name) for name in self._running if self.runs(name)}
         return {name: why for name, why in reasons.items() if why}
 
@@ -199,7 +199,7 @@ class Supervisor:
         return "waiting for something that does not come" if waits else ""
 
     def close(self) -> None:
-        """Ends all, and removes the shared memory."""
+        """End all processes, and remove the shared memory."""
         with children.interrupts_held():
             for process in self._running.values():
                 process.terminate()
@@ -234,7 +234,7 @@ def run_processes(
     watch: Callable[[Supervisor], None] | None = None,
     told: Callable[[str], None] | None = None,
 ) -> None:
-    """Runs the system until something outside is over, or Ctrl-C or SIGTERM ends all; a level that is killed or still is begun again.
+    """Run the system until a part outside is over, or Ctrl-C or SIGTERM ends all; restart a level that was killed or stands still.
 
     Args:
         description: Levels and wires.
@@ -280,7 +280,7 @@ STOPPED, WAITING = frozenset("Tt"), frozenset("SD")
 
 
 def _state(pid: int) -> tuple[str, float]:
-    """A process's state and the seconds of processor time it has used. Source: proc(5), /proc/PID/stat."""
+    """Return a process's state and the seconds of processor time it has used. Source: proc(5), /proc/PID/stat."""
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
@@ -305,7 +305,7 @@ def _say(text: str) -> None:
 
 @contextlib.contextmanager
 def _terminable() -> Iterator[None]:
-    """SIGTERM ends as Ctrl-C does, with everything cleaned up."""
+    """Let SIGTERM end the run as Ctrl-C does, with everything cleaned up."""
 
     def end(_number: int, _frame: FrameType | None) -> None:
         raise KeyboardInterrupt

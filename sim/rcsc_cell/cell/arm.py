@@ -46,7 +46,7 @@ _LINKS = (
 
 
 def plate(joints: Sequence[float]) -> Pose:
-    """Where the wrist plate is."""
+    """Return the pose of the wrist plate."""
     return _plate(tuple(joints))
 
 
@@ -56,7 +56,7 @@ def _plate(joints: Joints) -> Pose:
 
 
 def skeleton(joints: Sequence[float]) -> tuple[Vector, ...]:
-    """The stick figure: base, shoulder, shoulder's side, elbow, wrist's side, wrist, wrist plate; mm."""
+    """Return the stick figure: base, shoulder, shoulder's side, elbow, wrist's side, wrist, wrist plate; mm."""
     shoulder, elbow, _, wrist, _, flange = _frames(joints)
     side = shoulder.point((0.0, 0.0, OFFSET_MM))
     return (
@@ -83,12 +83,12 @@ def _frames(joints: Sequence[float]) -> list[Pose]:
 
 
 def solutions(wanted: Pose) -> list[Joints]:
-    """Return every way to bring the plate there, at most eight, ignoring limits."""
+    """Return every way to bring the plate to a pose, at most eight, ignoring limits."""
     return [joints for arm in _arms(wanted) for joints in _wrist(wanted.turn, *arm)]
 
 
 def _arms(wanted: Pose) -> list[tuple[float, float, float]]:
-    """The first three joints of every way to bring the plate there."""
+    """Return the first three joints of every way to bring the plate to a pose."""
     x, y, z = wanted.point((0.0, 0.0, -FLANGE_MM))
     z -= SHOULDER_MM
     far = hypot(x, y)
@@ -104,7 +104,7 @@ def _arms(wanted: Pose) -> list[tuple[float, float, float]]:
 
 
 def _elbow(out_mm: float, up_mm: float) -> list[tuple[float, float]]:
-    """The second and third joint for a wrist so far out and up from the shoulder: elbow up, elbow down."""
+    """Return the second and third joint for a wrist so far out and up from the shoulder: elbow up, elbow down."""
     forearm, bend = hypot(ELBOW_MM, FOREARM_MM), atan2(FOREARM_MM, ELBOW_MM)
     cosine = (out_mm**2 + up_mm**2 - UPPER_MM**2 - forearm**2) / (2 * UPPER_MM * forearm)
     if not -1.0 <= cosine <= 1.0:
@@ -119,7 +119,7 @@ def _elbow(out_mm: float, up_mm: float) -> list[tuple[float, float]]:
 
 
 def _wrist(turn: Rotation, first: float, second: float, third: float) -> list[Joints]:
-    """The last three joints: the turn as the forearm sees it, read off as a rotation about z, y and z."""
+    """Return all joints for each setting of the last three: the turn as the forearm sees it, read as a rotation about z, y and z."""
     c1, s1 = cos(first), sin(first)
     c23, s23 = cos(second + third), sin(second + third)
     forearm: Rotation = ((c1 * c23, s1 * c23, s23), (-s1, c1, 0.0), (-c1 * s23, -s1 * s23, c23))
@@ -141,7 +141,7 @@ def _wrist(turn: Rotation, first: float, second: float, third: float) -> list[Jo
 
 
 def solve(wanted: Pose, near: Sequence[float]) -> Joints | None:
-    """Return the solution that turns the joints least from where they are; None where none is within the limits.
+    """Return the solution that turns the joints least; None where none is within the limits.
 
     Args:
         wanted: The plate's pose.
@@ -172,7 +172,7 @@ def _unwound(joints: Joints, near: Sequence[float], least: float) -> Joints | No
 
 
 def margins_deg(joints: Sequence[float]) -> tuple[float, ...]:
-    """How far each joint is from its nearer limit, in degrees."""
+    """Return the distance of each joint from its nearer limit, in degrees."""
     return tuple(
         min(angle - low, high - angle) * 180.0 / pi for angle, (low, high) in zip(joints, LIMITS, strict=True)
     )

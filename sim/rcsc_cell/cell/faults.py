@@ -53,7 +53,7 @@ class Faults:
     vise_mute: bool = False
 
     def reachable(self, before: Joints, goal: Joints) -> Joints:
-        """Return the goal, with stuck joints where they were told to be last; both in radians."""
+        """Return the goal, with stuck joints at their last goal; both in radians."""
         return tuple(
             was if self.robot_stuck or self.joint_stuck == at else wanted
             for at, (was, wanted) in enumerate(zip(before, goal, strict=True), 1)

@@ -43,40 +43,40 @@ class JawController:
     _rest: int = 0
 
     def look(self, measured_mm: float) -> None:
-        """Counts cycles at rest."""
+        """Count cycles at rest."""
         moved = None if self._last_mm is None else abs(measured_mm - self._last_mm)
         self._rest = self._rest + 1 if moved is not None and moved <= REST_MM else 0
         self._last_mm = measured_mm
 
     def begin(self, opened: bool) -> None:
-        """Takes an order; rest counts from now."""
+        """Take an order; rest counts from now."""
         self.opened, self.held_mm, self._rest = opened, None, 0
 
     @property
     def at_rest(self) -> bool:
-        """Whether it has stopped moving."""
+        """True once it has stopped moving."""
         return self._rest >= REST_TICKS
 
     @property
     def ends(self) -> bool:
-        """Whether it stands as ordered: open as soon as it is out, closed when it has stopped on something."""
+        """True once it stands as ordered: open as soon as it is out, closed when it has stopped on something."""
         if self.opened is None or self._last_mm is None:
             return False
         return self._last_mm > OPEN_MM if self.opened else self.at_rest and self._last_mm < CLOSED_MM
 
     def hold(self) -> None:
-        """Stays where it is from now on."""
+        """Stay at the present place from now on."""
         if self._last_mm is not None and isfinite(self._last_mm):
             self.held_mm = self._last_mm
 
     def wait(self) -> None:
-        """Stays where it was first seen; no order has come yet."""
+        """Stay where it was first seen; no order has come yet."""
         if self.held_mm is None:
             self.hold()
 
     @property
     def target_mm(self) -> float:
-        """Where it is to go."""
+        """The place where it is sent, in mm."""
         if self.held_mm is not None:
             return self.held_mm
         return OUT_MM if self.opened else IN_MM
@@ -101,7 +101,7 @@ class ViseController(Kept):
     def step(
         self, order: Values | None, measured_right_mm: float, measured_left_mm: float
     ) -> tuple[float, float, Values]:
-        """One cycle.
+        """Run one cycle.
 
         Args:
             order: number, right_open, left_open; None before the first.
@@ -142,7 +142,7 @@ class ViseController(Kept):
 
 @dataclass(slots=True)
 class MachineController(Kept):
-    """Carries out operations, each for `OPERATION_TICKS`; none is done on a part that is not clamped.
+    """Carries out operations, each for `OPERATION_TICKS`; does none on a part that is not clamped.
 
     Attributes:
         number: Of the order that `status` is about.
@@ -153,7 +153,7 @@ class MachineController(Kept):
     _ticks: int = -1  # since the order; negative before the first
 
     def step(self, order: Values | None, right_mm: float, left_mm: float) -> Values:
-        """One cycle; the report: echo, status.
+        """Run one cycle; return the report: echo, status.
 
         Args:
             order: number, operation (0 is none); None before the first.

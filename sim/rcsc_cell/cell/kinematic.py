@@ -38,7 +38,7 @@ UPRIGHT: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What the next cycle depends on, without faults."""
+    """The state that the next cycle depends on, without faults."""
 
     joints: Joints
     poses: list[Pose]
@@ -67,7 +67,7 @@ class Kinematic:
         self.reset()
 
     def reset(self) -> None:
-        """Everything as at first."""
+        """Reset everything."""
         self.faults = Faults()
         self._joints = self.start
         self._poses = [Pose(body.turn, body.at_mm) for body in self.bodies]
@@ -89,27 +89,27 @@ class Kinematic:
     # --- readings ---
 
     def joints(self) -> Joints:
-        """The joints as they are, in radians."""
+        """Return the joints as they are, in radians."""
         return self._joints
 
     def hand(self) -> tuple[float, float]:
-        """Between the pads, in mm; the force on them, in N."""
+        """Return the distance between the pads, in mm, and the force on them, in N."""
         return self._opening_mm, self._force_n
 
     def jaws(self) -> tuple[float, float]:
-        """Right and left, in mm from where they touch a part."""
+        """Return the right and the left jaw, in mm from where they touch a part."""
         return self._jaws_mm
 
     def parts(self) -> tuple[Pose, ...]:
-        """Where the parts are in truth: for those who judge a run."""
+        """Return the true poses of the parts: for those who judge a run."""
         return tuple(self._poses)
 
     def touching(self) -> frozenset[tuple[str, str]]:
-        """Return what the hand holds, the only contact of kinematics."""
+        """Return the contact of the hand with the part that it holds, the only one of kinematics."""
         return self._touching
 
     def space(self) -> "MechanismSpace":
-        """How it looks: as the model that physics moves looks where everything is."""
+        """Return the scene: the model that physics would move, with everything where it is now."""
         from rcsc_cell.cell.space import MechanismSpace  # MuJoCo is loaded only where somebody looks
 
         if self._space is None or self._space.mechanism is not self:
@@ -131,10 +131,10 @@ class Kinematic:
         )  # fmt: skip
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of the same cell.
+        """Put back a state of the same cell.
 
         Raises:
-            ValueError: It is of another.
+            ValueError: The state is of another cell.
         """
         held: _State = read(_State, state)
         if len(held.poses) != len(self.bodies) or not 0 <= (held.held or 0) < max(1, len(self.bodies)):
@@ -149,7 +149,7 @@ class Kinematic:
     # --- one cycle ---
 
     def advance(self, goal: Joints, grip: Grip, jaws_mm: tuple[float, float]) -> None:
-        """One cycle: the joints go to the goal, a part that is held goes with them; then the fingers and the jaws."""
+        """Run one cycle: the joints go to the goal, a held part goes with them; then the fingers and the jaws move."""
         self._move(goal)
         self._close(grip)
         if not self.faults.vise_stuck:
@@ -176,7 +176,7 @@ class Kinematic:
     # --- hand ---
 
     def between(self) -> int | None:
-        """The part between the pads; None where there is none, or the fingers stand on it."""
+        """Return the part between the pads; None where there is none, or the fingers stand on it."""
         for at, (body, pose) in enumerate(zip(self.bodies, self._poses, strict=True)):
             across, along, deep = (_extent(body, pose, self._pads.axis(axis)) for axis in (1, 0, 2))
             x, y, z = self._pads.inside(pose.at_mm)
@@ -201,7 +201,7 @@ class Kinematic:
             self._let_go()
 
     def _hold(self, part: int) -> None:
-        """The fingers turn the part square to them and bring it to their middle."""
+        """Hold a part: the fingers turn it square to them and bring it to their middle."""
         if self._held == part:
             return
         self._held = part
@@ -213,7 +213,7 @@ class Kinematic:
         self._in_hand = self._pads.inverse() @ held
 
     def push(self, part: int, x_mm: float, y_mm: float) -> None:
-        """Somebody pushes a part that nobody holds."""
+        """Push a part that nobody holds."""
         if part != self._held:
             x, y, z = self._poses[part].at_mm
             self._poses[part] = replace(self._poses[part], at_mm=(x + x_mm, y + y_mm, z))
@@ -235,7 +235,7 @@ class Kinematic:
     # --- vise ---
 
     def _clamp(self, wanted_mm: tuple[float, float]) -> None:
-        """Move the jaws to where they are sent, as far as a part between them lets them."""
+        """Move the jaws to their goals, as far as a part between them lets them."""
         part = self._in_vise()
         stops = (0.0 if part is not None else -6.0, 0.0)
         far = JAW_MM_S * CYCLE_S
@@ -275,7 +275,7 @@ class Kinematic:
         return NOISY if self.faults.noisy else STANDARD
 
     def _tops(self) -> tuple[Top, ...]:
-        """The upper faces of all parts in camera axes: x to the right is the plate's y, y up its x, and z back along the tool."""
+        """Return the upper faces of all parts in camera axes: x to the right is the plate's y, y up its x, and z back along the tool."""
         here = plate(self._joints)
         camera = Pose(
             transposed((here.axis(1), here.axis(0), _back(here.axis(2)))),
@@ -289,7 +289,7 @@ def _back(v: Vector) -> Vector:
 
 
 def _top(body: Body, pose: Pose, camera: Pose) -> Top:
-    """The face of a part that is uppermost."""
+    """Return the uppermost face of a part."""
     ups = [pose.axis(axis)[2] for axis in range(3)]
     up = max(range(3), key=lambda at: abs(ups[at]))
     sign = 1.0 if ups[up] > 0 else -1.0

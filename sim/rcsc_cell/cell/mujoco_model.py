@@ -39,7 +39,7 @@ DAMPING = (3.0, 5.0, 2.0, 0.4, 0.4, 0.2)
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A part as physics has it.
+    """A part, as physics needs it.
 
     Attributes:
         size_mm: Length, width, height; the fingers take it across the width.
@@ -55,13 +55,13 @@ class Body:
     friction: float = 0.4
 
     def lowest_mm(self, pose: Pose) -> float:
-        """The height of its lowest point where it lies so."""
+        """Return the height of its lowest point at a pose."""
         return pose.at_mm[2] - sum(abs(pose.axis(at)[2]) * self.size_mm[at] / 2 for at in range(3))
 
 
 @dataclass(frozen=True, slots=True)
 class Make:
-    """How a cell is made.
+    """The settings with which a cell's model is made.
 
     Attributes:
         step_s: One step of physics. 2 ms is measured to be enough; at 8 ms the vise no longer takes a part.
@@ -76,7 +76,7 @@ USUAL = Make()
 
 
 def mjcf(database: Database, parts: Sequence[Body], make: Make = USUAL) -> str:
-    """The cell's model.
+    """Write the cell's model.
 
     Args:
         database: Stations, fixtures, the hand's measures.
@@ -225,7 +225,7 @@ def _station(station: Station) -> str:
 
 
 def _vise(fixture: Mapping[str, object]) -> str:
-    """A bed, and two jaws that close along x on it; a jaw at zero touches a part of the width that it is made for.
+    """Write a bed, and two jaws that close along x on it; a jaw at zero touches a part of the width that it is made for.
 
     The left jaw rests on its stop at zero: what is clamped against it lies where it should. The right one goes on until it meets
     something.
@@ -246,14 +246,14 @@ def _vise(fixture: Mapping[str, object]) -> str:
 
 
 def _machine() -> str:
-    """The machine behind the vise; it does not touch anything."""
+    """Write the machine behind the vise; it touches nothing."""
     return """<geom class="look" group="0" type="box" pos="0.36 0 0.10" size="0.10 0.16 0.45" material="steel"/>
 <geom class="look" group="0" type="box" pos="0.24 0 0.37" size="0.06 0.05 0.09" material="dark"/>
 """
 
 
 def _vblock(fixture: Mapping[str, object]) -> str:
-    """Two walls at 45 degrees along x, smooth, so that what is put between them slides home."""
+    """Write two walls at 45 degrees along x, smooth, so that a part put between them slides home."""
     down, along, bottom, thick = (
         float(fixture["wall_mm"]) * M,  # type: ignore[arg-type]
         float(fixture["width_mm"]) / 2 * M,  # type: ignore[arg-type]

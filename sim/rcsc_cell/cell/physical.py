@@ -34,7 +34,7 @@ CLOSED_MM = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What the next cycle depends on, without faults."""
+    """The state that the next cycle depends on, without faults."""
 
     physics: list[float]
     goal: Joints
@@ -78,7 +78,7 @@ class Physical:
         self.reset()
 
     def reset(self) -> None:
-        """Reset everything, and what faults changed in the model."""
+        """Reset everything, with all that faults changed in the model."""
         self.faults = Faults()
         self.model.geom_friction[:] = self._friction
         mujoco.mj_resetData(self.model, self.data)
@@ -101,11 +101,11 @@ class Physical:
     # --- readings ---
 
     def joints(self) -> Joints:
-        """The joints as they are, in radians."""
+        """Return the joints as they are, in radians."""
         return tuple(self.data.qpos[:6].tolist())
 
     def hand(self) -> tuple[float, float]:
-        """Between the pads, in mm; the lesser of the forces on them, in N."""
+        """Return the distance between the pads, in mm, and the lesser of the forces on them, in N."""
         opening_mm = 1000.0 * float(self.data.qpos[self._fingers].sum())
         felt = self.data.sensordata
         force_n = min(float(np.linalg.norm(felt[at + 1 : at + 4])) for at in self._felt)
@@ -114,12 +114,12 @@ class Physical:
         return opening_mm, force_n
 
     def jaws(self) -> tuple[float, float]:
-        """Right and left, in mm from where they touch a part."""
+        """Return the right and the left jaw, in mm from where they touch a part."""
         right, left = self.data.qpos[self._jaws]
         return 1000.0 * float(right), 1000.0 * float(left)
 
     def parts(self) -> tuple[Pose, ...]:
-        """Where the parts are in truth: for those who judge a run."""
+        """Return the true poses of the parts: for those who judge a run."""
         return tuple(self._pose(f"part{at}") for at in range(len(self.bodies)))
 
     def _pose(self, name: str) -> Pose:
@@ -130,7 +130,7 @@ class Physical:
         return Pose(turn, at)
 
     def touching(self) -> frozenset[tuple[str, str]]:
-        """What touches what, by the names of the geoms, in order."""
+        """Return the pairs in contact, by the names of the geoms, in order."""
         pairs = self.data.contact.geom[self.data.contact.dist <= 0.0] if self.data.ncon else []
         return frozenset(
             (first, second) if first <= second else (second, first)
@@ -138,7 +138,7 @@ class Physical:
         )
 
     def space(self) -> ModelSpace:
-        """How it looks."""
+        """Return the scene."""
         return ModelSpace(self.model, self.data)
 
     # --- put back after a stop ---
@@ -151,10 +151,10 @@ class Physical:
         return cast(dict[str, Any], plain(state))
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of the same cell.
+        """Put back a state of the same cell.
 
         Raises:
-            ValueError: It is of another.
+            ValueError: The state is of another cell.
         """
         held: _State = read(_State, state)
         if len(held.physics) != mujoco.mj_stateSize(self.model, STATE):
@@ -169,7 +169,7 @@ class Physical:
     # --- one cycle ---
 
     def advance(self, goal: Joints, grip: Grip, jaws_mm: tuple[float, float]) -> None:
-        """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
+        """Run one cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
         self._apply_faults()
         before, self._goal = self._goal, self.faults.reachable(self._goal, goal)
         a, b = np.array(before), np.array(self._goal)
@@ -189,7 +189,7 @@ class Physical:
         )  # what is read belongs to the end of the cycle, not to the step before it
 
     def _squeezed(self, grip: Grip) -> float:
-        """Where the fingers are sent, in m: toward the opening at the speed, and no farther from where they are than the force.
+        """Return the fingers' set point, in m: toward the opening at the speed, and no farther from where they are than the force.
 
         An opening of none is a grasp, and goes on until the force is met, though by fingers that meet each other. The motor is a
         spring of `GAIN_N_M`: the model stays as it is, whatever the force.
@@ -211,12 +211,12 @@ class Physical:
     # --- camera ---
 
     def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
-        """A flood picture, looked at for a part."""
+        """Take a flood picture, and find a part in it."""
         camera, optics = self._camera()
         return find(camera.flood(self.data, self._rng), wanted, expected_mm, optics)
 
     def lines(self, expected_mm: float) -> Surface | None:
-        """A picture with two lines, looked at for a part."""
+        """Take a picture with two lines, and measure the part's surface."""
         camera, optics = self._camera()
         return measure(camera.lines(self.data, self._rng), expected_mm, optics)
 

@@ -71,10 +71,10 @@ def noise_of(rng: np.random.Generator) -> Noise:
 
 
 def put_noise(rng: np.random.Generator, noise: Noise) -> None:
-    """Puts a generator into a state.
+    """Put a generator into a state.
 
     Raises:
-        ValueError: It has none such.
+        ValueError: The generator has no such state.
     """
     try:
         rng.bit_generator.state = plain(noise)
@@ -84,7 +84,7 @@ def put_noise(rng: np.random.Generator, noise: Noise) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """What the fingers are to do: toward an opening, with at most a force; `drive` is false where they are to stay."""
+    """The order to the fingers: toward an opening, with at most a force; `drive` is false where they are to stay."""
 
     drive: bool
     opening_mm: float
@@ -97,40 +97,40 @@ DROP = Grip(True, WIDE_MM, 400.0, 300.0)
 
 
 class Mechanism(Protocol):
-    """What moves."""
+    """The moving things of the cell."""
 
     faults: Faults
 
     def reset(self) -> None:
-        """Everything as at first, what faults changed too."""
+        """Reset everything, with all that faults changed."""
         ...
 
     def joints(self) -> Joints:
-        """The joints as they are, in radians."""
+        """Return the joints as they are, in radians."""
         ...
 
     def hand(self) -> tuple[float, float]:
-        """Between the pads, in mm; the force on them, in N."""
+        """Return the distance between the pads, in mm, and the force on them, in N."""
         ...
 
     def jaws(self) -> tuple[float, float]:
-        """The vise's right and left jaw, in mm from where they touch a part."""
+        """Return the vise's right and left jaw, in mm from where they touch a part."""
         ...
 
     def advance(self, goal: Joints, grip: Grip, jaws_mm: tuple[float, float]) -> None:
-        """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
+        """Run one cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
         ...
 
     def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
-        """A flood picture, looked at for a part; None where none matches."""
+        """Take a flood picture, and find a part in it; None where none matches."""
         ...
 
     def lines(self, expected_mm: float) -> Surface | None:
-        """A picture with two lines, looked at for a part; None where the lines do not fall on a surface."""
+        """Take a picture with two lines, and measure a surface; None where the lines do not fall on one."""
         ...
 
     def parts(self) -> tuple[Pose, ...]:
-        """Where the parts are in truth: for those who judge a run, never for those who control it."""
+        """Return the true poses of the parts: for those who judge a run, never for those who control it."""
         ...
 
     def state(self) -> dict[str, Any]:
@@ -138,15 +138,15 @@ class Mechanism(Protocol):
         ...
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of the same cell; ValueError where it is of another."""
+        """Put back a state of the same cell; raise ValueError where it is of another."""
         ...
 
     def touching(self) -> frozenset[tuple[str, str]]:
-        """What touched what in the last cycle, by the names of the things, in order: for those who judge."""
+        """Return the pairs that touched in the last cycle, by the names of the things, in order: for those who judge."""
         ...
 
     def space(self) -> Space:
-        """How it looks: for those who watch."""
+        """Return the scene: for those who watch."""
         ...
 
 
@@ -171,11 +171,11 @@ class Plant:
 
     @property
     def faults(self) -> Faults:
-        """What goes wrong."""
+        """The faults of the mechanism."""
         return self.mechanism.faults
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One cycle of everything."""
+        """Run one cycle of everything."""
         self._command(latest("primitive.to_robot"))
         right, left = self.mechanism.jaws()
         to_right, to_left, vise = self.vise.step(latest(VISE_ORDER), right, left)
@@ -193,11 +193,11 @@ class Plant:
 
     @property
     def plate(self) -> tuple[float, ...]:
-        """The nine numbers of where the wrist plate is in truth."""
+        """The nine numbers of the wrist plate's true pose."""
         return nine(plate(self.mechanism.joints()))
 
     def space(self) -> Space:
-        """How the cell looks."""
+        """Return the scene of the cell."""
         return self.mechanism.space()
 
     # --- put back after a stop ---
@@ -209,10 +209,10 @@ class Plant:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Takes a state of the same cell.
+        """Put back a state of the same cell.
 
         Raises:
-            ValueError: It is of another, or of none.
+            ValueError: The state is of another cell, or of none.
         """
         if set(state) != {*CONTROLLERS, "mechanism"}:
             raise ValueError("not the state of a plant")
@@ -246,7 +246,7 @@ class Plant:
     # --- vise ---
 
     def _pressed(self, right_mm: float, wanted_mm: float) -> float:
-        """Return where the right jaw is sent: a weak one closes no farther than `WEAK_MM`, and is not pushed out by that."""
+        """Return the place where the right jaw is sent: a weak one closes no farther than `WEAK_MM`, and is not pushed out by that."""
         return max(wanted_mm, min(right_mm, WEAK_MM)) if self.faults.vise_weak else wanted_mm
 
     # --- camera ---
@@ -261,7 +261,7 @@ class Plant:
             self._picture = self._developing
 
     def _shot(self, fire: int, wanted: int) -> tuple[Value, ...]:
-        """matched, x, y, cosine and sine of the turn, range, the surface's normal in camera axes."""
+        """Return the picture: matched, x, y, cosine and sine of the turn, range, the surface's normal in camera axes."""
         expected_mm = float(self.database.part(wanted)[1])
         if self.faults.blind or fire == DARK or expected_mm <= 0.0:
             return NO_PICTURE
@@ -285,7 +285,7 @@ class Plant:
         )
 
     def _find(self, wanted: int, expected_mm: float) -> FoundPart | None:
-        """Return where the camera sees the part; None where it sees none, or cannot look."""
+        """Return the part as the camera sees it; None where it sees none, or cannot look."""
         size = self.database.sizes.get(wanted)
         if size is None or min(size) <= 0.0:
             return None

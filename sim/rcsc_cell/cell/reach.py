@@ -26,13 +26,13 @@ RULES = ("arm.py", "reach.py")
 
 
 def home(database: Database) -> Joints | None:
-    """The joints at the home pose; None where the arm cannot be there."""
+    """Return the joints at the home pose; None where the arm cannot be there."""
     plate = pose_of([float(value) for value in database.home])
     return None if plate is None else solve(plate, HOME)
 
 
 def unreachable(database: Database) -> tuple[str, ...]:
-    """Points that the arm cannot take, and paths on which it would have to turn over."""
+    """Return the points that the arm cannot take, and the paths on which it would have to turn over."""
     start = home(database)
     if start is None:
         return ("the robot cannot be at its home",)
@@ -41,7 +41,7 @@ def unreachable(database: Database) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Passed:
-    """That the arm could go everywhere in a database."""
+    """A cache entry: the arm can go everywhere in a database."""
 
 
 def checked(database: Database, cache: Cache | None = None) -> None:
@@ -52,7 +52,7 @@ def checked(database: Database, cache: Cache | None = None) -> None:
         cache: Where it is kept which databases have passed; the arm need not go anywhere in one of them. None for nowhere.
 
     Raises:
-        BadData: It cannot be somewhere.
+        BadData: There is a place that it cannot reach.
     """
 
     def passed() -> Passed:
@@ -99,7 +99,7 @@ def _problems(database: Database, start: Joints) -> Iterator[str]:
 
 
 def _whole(database: Database, pair: tuple[int, int, int, int]) -> list[tuple[float, ...]]:
-    """The plate at every point of a path of two places, from where the robot stands at the first."""
+    """Return the plate at every point of a path of two places, from where the robot stands at the first."""
     _, _, _, comes, more, *_ = database.route(*pair[:2])
     _, leaves, many, first, count = database.path(*pair)
     points = [int(comes) + int(more) - 1]
@@ -112,7 +112,7 @@ def _plate(database: Database, point: int) -> tuple[float, ...]:
 
 
 def _passes(path: Sequence[tuple[float, ...]], start: Joints) -> bool:
-    """Whether the arm follows the lines without turning over."""
+    """Tell whether the arm follows the lines without turning over."""
     joints = _at(path[0], start)
     for a, b in pairwise(path):
         far = max(abs(x - y) for x, y in zip(a, b, strict=True))

@@ -18,14 +18,14 @@ Backend = Literal["mujoco", "kinematic"]
 
 @dataclass(frozen=True, slots=True)
 class Lying:
-    """A part that lies somewhere at first: what it is, and its body."""
+    """A part at its first place: its object and its body."""
 
     object: int
     body: Body
 
 
 def lying(database: Database) -> tuple[Lying, ...]:
-    """The parts of the database where it has them."""
+    """Return the parts of the database at their places."""
     return tuple(
         Lying(part.object, Body(size, (part.x_mm, part.y_mm, part.z_mm + size[2] / 2), about_z(part.yaw_deg)))
         for part in database.parts
@@ -40,7 +40,7 @@ def plant(
     seed: int = 0,
     make: Make = USUAL,
 ) -> Plant:
-    """A plant whose robot is at home.
+    """Make a plant whose robot is at home.
 
     Args:
         database: The cell.

@@ -44,11 +44,11 @@ class Robot:
     _before: Joints = field(init=False)
 
     def __post_init__(self) -> None:
-        """It rests at first."""
+        """Start at rest."""
         self._before = self.joints
 
     def order(self, order: Values | None, measured: Sequence[float]) -> None:
-        """Takes the order of a cycle, and sets `joints` to where they go in it.
+        """Take the order of a cycle, and set `joints` to their goal in it.
 
         Args:
             order: Number, command, nine numbers; None before the first.
@@ -84,7 +84,7 @@ class Robot:
             self.joints = tuple(measured)
 
     def report(self, measured: Sequence[float]) -> tuple[Value, ...]:
-        """Number, command, status, reason, and the nine numbers of where the plate is.
+        """Return number, command, status, reason, and the nine numbers of the plate's pose.
 
         A reading outside its declared range is a failure of the robot's, and comes as the end of the range that it passed. To hold
         needs no reading: the brakes are set.
@@ -99,7 +99,7 @@ class Robot:
         return (self.number, self.command, DONE if self._done(measured) else EXECUTING, 0, *admitted)
 
     def _done(self, measured: Sequence[float]) -> bool:
-        """A pose is followed when the joints are there; they hold when they do not move, though a vise may have pushed them aside."""
+        """Tell whether the order is done: a pose when the joints are there; a hold when they rest, though a vise may have pushed them."""
         before, self._before = self._before, tuple(measured)
         if self.command == HOLD:
             return max(abs(a - b) for a, b in zip(before, measured, strict=True)) <= REST_RAD

@@ -14,7 +14,7 @@ from rcsc_cell.database.ask import Database
 
 
 class MechanismSpace:
-    """A mechanism without physics, shown by the model that physics would move, put where the mechanism says that everything is.
+    """The scene of a mechanism without physics: the model that physics would move, posed as the mechanism says.
 
     Args:
         mechanism: What says it.
@@ -29,7 +29,7 @@ class MechanismSpace:
         self._put()
 
     def of(self, mechanism: Mechanism) -> "MechanismSpace":
-        """Return the same for a copy of the mechanism; the model is shared."""
+        """Return the scene of a copy of the mechanism; the model is shared."""
         other = copy.copy(self)
         other.mechanism = mechanism
         return other
@@ -41,11 +41,11 @@ class MechanismSpace:
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
-        """As physics has them."""
+        """The shapes of the model."""
         return self._shown.shapes
 
     def poses(self) -> list[float]:
-        """Seven numbers a body."""
+        """Return the poses, seven numbers a body."""
         self._put()
         return self._shown.poses()
 

@@ -58,14 +58,14 @@ class Station:
     vblock: Mapping[str, Any]
 
     def below(self, at_mm: Vector) -> bool:
-        """Whether it stands below a point of the base's axes, however high that is."""
+        """Tell whether it stands below a point of the base's axes, however high that is."""
         x, y, _ = self.frame.inside(at_mm)
         return abs(x) <= self.size_mm[0] / 2 and abs(y) <= self.size_mm[1] / 2
 
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """What is at the robot's wrist.
+    """The hand at the robot's wrist.
 
     Attributes:
         tool_mm: From the wrist plate to the middle of the pads.
@@ -80,7 +80,7 @@ class Hand:
 
 @dataclass(frozen=True, slots=True)
 class Database:
-    """Everything that the levels may ask."""
+    """All queries of the levels, and their answers."""
 
     locations: Mapping[str, int]
     objects: Mapping[str, int]
@@ -99,23 +99,23 @@ class Database:
     _approaches: Mapping[tuple[int, int, int], tuple[int, int]]
 
     def place(self, location: int) -> Values:
-        """known, vision, buffer, vupos, safe."""
+        """Return a place: known, vision, buffer, vupos, safe."""
         return self._places.get(location, NO_PLACE)
 
     def route(self, location: int, sector: int) -> Values:
-        """known, departure (first point, count), approach (first point, count), points to hover, to grasp and to look from."""
+        """Return a route: known, departure and approach (first point, count each), points to hover, to grasp and to look from."""
         known = self._routes.get((location, sector))
         if known is None and not self._is_pallet(location):  # it has no sectors
             known = self._routes.get((location, 0))
         return known or NO_ROUTE
 
     def target(self, location: int, sector: int) -> Values:
-        """known, points to hover, to grasp and to look from."""
+        """Return a target: known, points to hover, to grasp and to look from."""
         known, *_, hover, grasp, view = self.route(location, sector)
         return known, hover, grasp, view
 
     def path(self, here: int, here_sector: int, location: int, sector: int) -> Values:
-        """known, departure (first point, count), approach (first point, count) of the way from one location to another.
+        """Return the way from one location to another: known, departure (first point, count), approach (first point, count).
 
         Those of the pair, else the departure of the one and the approach of the other. A robot that is there already stays, but for
         a location where vision says where a part is: there it may stand beside it.
@@ -148,42 +148,42 @@ class Database:
         return one == other or not self._is_pallet(location)
 
     def part(self, number: int) -> Values:
-        """known, ranges in mm from the camera to its top as it lies, and at which its top is where the pads take it; lift in mm; normal.
+        """Return a part: known, ranges in mm from the camera to its top, as it lies and when the pads can take it; lift in mm; normal.
 
         The lift: how much higher than at the locations of the data the pads hold it. The normal: of its top, in the camera's axes.
         """
         return self._parts.get(number, NO_PART)
 
     def point(self, number: int) -> Values:
-        """known, nine numbers in mm, speed in mm/s, acceleration and deceleration in mm/s^2, breakpoint distance in mm."""
+        """Return a point: known, nine numbers in mm, speed in mm/s, acceleration and deceleration in mm/s^2, breakpoint distance in mm."""
         return self._points.get(number, NO_POINT)
 
     def fingers(self, number: int, grasp: int) -> Values:
-        """known, approach, departure and grip opening and tolerance in mm, force in N, speed in mm/s."""
+        """Return a grasp: known, approach, departure and grip opening and tolerance in mm, force in N, speed in mm/s."""
         return self._fingers.get((number, grasp), NO_FINGERS)
 
     def plate(self, location: int, sector: int) -> Pose | None:
-        """The wrist plate, in mm, at the last point of the way to a location; None where there is no such way."""
+        """Return the wrist plate, in mm, at the last point of the way to a location; None where there is no such way."""
         known, _, _, comes, many, *_ = self.route(location, sector)
         if not known or not many:
             return None
         return pose_of([float(value) for value in self.point(int(comes) + int(many) - 1)[1:10]])
 
     def pads(self, location: int, sector: int) -> Vector | None:
-        """The middle of the pads, in mm, when the robot is there; None likewise."""
+        """Return the middle of the pads, in mm, when the robot is at a location; None where there is no way to it."""
         plate = self.plate(location, sector)
         return None if plate is None else plate.point((0.0, 0.0, self.hand.tool_mm))
 
     def station_below(self, at_mm: Vector) -> Station | None:
-        """The station that stands below a point; None over the floor."""
+        """Return the station that stands below a point; None over the floor."""
         return next((station for station in self.stations.values() if station.below(at_mm)), None)
 
     def routes(self) -> tuple[tuple[int, int, Values], ...]:
-        """Every route with its location and sector."""
+        """Return every route with its location and sector."""
         return tuple((location, sector, row) for (location, sector), row in self._routes.items())
 
     def pairs(self) -> tuple[tuple[int, int, int, int], ...]:
-        """Every two places with a path of their own: location and sector of the one and of the other."""
+        """Return every two places with a path of their own: location and sector of each."""
         return tuple(
             (*here, *there)
             for here in self._routes
@@ -193,7 +193,7 @@ class Database:
 
     @property
     def queries(self) -> dict[str, Callable[..., Values]]:
-        """Return the queries by name, for the levels' feeds."""
+        """The queries by name, for the levels' feeds."""
         return {
             "place": self.place,
             "target": self.target,
@@ -303,7 +303,7 @@ def _schema() -> tuple[list[Any], Mapping[str, tuple[_Column, ...]]]:
 
 
 def fresh(path: Path, expected: str) -> bool:
-    """Return whether the file is a database built from what `expected` digests."""
+    """Tell whether the file is a database with the digest `expected`."""
     try:
         return tables_of(path)["meta"].rows == ((expected,),)
     except BadData:
@@ -381,7 +381,7 @@ def _fixture(text: str | None, kind: Mapping[str, Kind]) -> Mapping[str, Any]:
     """Return the numbers of a fixture, checked as the data file's are.
 
     Raises:
-        Malformed: They are others.
+        Malformed: The numbers are not those of its kind.
     """
     if text is None:
         return {}

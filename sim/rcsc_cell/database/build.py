@@ -86,7 +86,7 @@ DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
 
 
 class BadData(BadFile):
-    """The data says something that cannot be; `problems` has every such thing."""
+    """Data with errors; `problems` lists all of them."""
 
     code = Code.BAD_DATA
 
@@ -101,7 +101,7 @@ class BadData(BadFile):
 
     @property
     def shown(self) -> str:
-        """Each problem."""
+        """All problems, one a line."""
         return "\n".join(self.problems)
 
 
@@ -183,7 +183,7 @@ COLUMNS: Mapping[str, Kind] = {
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A leaf that an answer of the database fills, and what it may hold."""
+    """A leaf that an answer of the database fills, and the values that it can hold."""
 
     leaf: str
     low: float
@@ -196,7 +196,7 @@ Limits: TypeAlias = Mapping[str, Sequence[Sequence[Limit | None]]]
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """What a fault is about, in words, and its place in the file."""
+    """The subject of an error, in words, and its place in the file."""
 
     words: str
     path: KeyPath
@@ -218,14 +218,14 @@ class Location:
     hand: Pose
 
     def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Location":
-        """Return it moved along the station's axes."""
+        """Return the location moved along the station's axes."""
         to = self.frame.point((x_mm, y_mm, z_mm))
         by = [a - b for a, b in zip(to, self.frame.at_mm, strict=True)]
         at = self.hand.at_mm
         return Location(self.frame, Pose(self.hand.turn, (at[0] + by[0], at[1] + by[1], at[2] + by[2])))
 
     def plate(self, tool_mm: float) -> Pose:
-        """The wrist plate of a hand that is there."""
+        """Return the wrist plate of a hand at the location."""
         return self.hand @ Pose(UPRIGHT, (0.0, 0.0, -tool_mm))
 
 
@@ -234,10 +234,10 @@ FLOOR = Pose(UPRIGHT, (0.0, 0.0, 0.0))
 
 
 def read_data(path: Path) -> Document:
-    """The data file, of which nothing but single values and keys has been checked.
+    """Read the data file; check nothing but single values and keys.
 
     Raises:
-        BadData: It cannot be read, or holds what no data file may; everything that is wrong with it is told.
+        BadData: It cannot be read, or holds what no data file may; all errors are reported.
     """
     document = read_document(path, Code.BAD_DATA, BadData)
     document.check(CELL)
@@ -264,7 +264,7 @@ def build(data: Path, database: Path, objects: Sequence[str], limits: Limits | N
         limits: What the levels can hold of each answer.
 
     Raises:
-        BadData: Something is wrong with the data; nothing is written.
+        BadData: The data has errors; nothing is written.
         OSError: The file cannot be written.
     """
     rows = _Rows(read_data(data), objects, limits or {})
@@ -294,7 +294,7 @@ def _fill(database: Path, rows: "_Rows", data: Path, made_of: str) -> None:
 
 
 class _Rows:
-    """The rows of every table, and everything that is wrong with them."""
+    """The rows of every table, and all errors in them."""
 
     def __init__(self, document: Document, objects: Sequence[str], limits: Limits) -> None:
         toml = document.value
@@ -328,7 +328,7 @@ class _Rows:
         self.tables["robot"] = [(*nine(home), self.tool_mm, float(robot["pad_mm"]), *camera)]
 
     def wrong(self, where: At, what: str, *helps: str) -> None:
-        """Notes a problem."""
+        """Note a problem."""
         self.document.wrong(where.path, f"{where}: {what}", *helps)
 
     def _ranges(self) -> None:
@@ -560,7 +560,7 @@ class _Rows:
         return place.moved(0.0, 0.0, float(step))
 
     def _viewpoint(self, place: Location, location: Mapping[str, Any], where: At) -> Location:
-        """Return where the hand has its camera over the place: vision's second look is centred on the part."""
+        """Return the location where the hand has its camera over the place: vision's second look is centred on the part."""
         looks = self.toml["location"].get(location.get("vupos", ""))
         if not location.get("vision") or looks is None:
             return place
@@ -591,7 +591,7 @@ class _Rows:
 
 
 def depth_mm(height_mm: float, pad_mm: float) -> float:
-    """From the top of a part to the middle of the pads that take it from above.
+    """Return the distance from the top of a part to the middle of the pads that take it from above, in mm.
 
     Args:
         height_mm: Of the part.

@@ -31,44 +31,44 @@ class Pose:
     at_mm: Vector
 
     def point(self, inside_mm: Vector) -> Vector:
-        """A point of the body, seen from the base."""
+        """Return a point of the body, seen from the base."""
         x, y, z = apply(self.turn, inside_mm)
         return (self.at_mm[0] + x, self.at_mm[1] + y, self.at_mm[2] + z)
 
     def inside(self, point_mm: Vector) -> Vector:
-        """A point of the base's, seen from the body."""
+        """Return a point of the base, seen from the body."""
         return apply(transposed(self.turn), minus(point_mm, self.at_mm))
 
     def __matmul__(self, other: "Pose") -> "Pose":
-        """Where a body is whose pose is known in this body's axes."""
+        """Return the pose, seen from the base, of a body whose pose is known in this body's axes."""
         return Pose(product(self.turn, other.turn), self.point(other.at_mm))
 
     def inverse(self) -> "Pose":
-        """The base seen from the body."""
+        """Return the pose of the base, seen from the body."""
         back = transposed(self.turn)
         x, y, z = apply(back, self.at_mm)
         return Pose(back, (-x, -y, -z))
 
     def axis(self, number: int) -> Vector:
-        """The unit vector along the body's x (0), y (1) or z (2)."""
+        """Return the unit vector along the body's x (0), y (1) or z (2)."""
         return (self.turn[0][number], self.turn[1][number], self.turn[2][number])
 
 
 def apply(turn: Rotation, v: Vector) -> Vector:
-    """The vector turned."""
+    """Return the turned vector."""
     (a, b, c), (d, e, f), (g, h, i) = turn
     x, y, z = v
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def transposed(turn: Rotation) -> Rotation:
-    """The inverse of a rotation."""
+    """Return the inverse of a rotation."""
     (a, b, c), (d, e, f), (g, h, i) = turn
     return ((a, d, g), (b, e, h), (c, f, i))
 
 
 def product(first: Rotation, second: Rotation) -> Rotation:
-    """Second, then first."""
+    """Return the rotation that applies the second, then the first."""
     (a, b, c), (d, e, f), (g, h, i) = first
     (j, k, m), (n, p, q), (r, s, t) = second
     return (
@@ -79,49 +79,49 @@ def product(first: Rotation, second: Rotation) -> Rotation:
 
 
 def minus(a: Vector, b: Vector) -> Vector:
-    """From b to a."""
+    """Return the vector from b to a."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """The scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product."""
+    """Return the vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def unit(v: Vector) -> Vector:
-    """The vector made one long.
+    """Return the vector scaled to length one.
 
     Raises:
-        ZeroDivisionError: It has no length.
+        ZeroDivisionError: Its length is zero.
     """
     length = sqrt(dot(v, v))
     return (v[0] / length, v[1] / length, v[2] / length)
 
 
 def about_y(angle_deg: float) -> Rotation:
-    """A turn about y."""
+    """Return a turn about y."""
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
     return ((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c))
 
 
 def about_z(angle_deg: float) -> Rotation:
-    """A turn about z."""
+    """Return a turn about z."""
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
     return ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
 
 
 def nine(plate: Pose) -> tuple[float, ...]:
-    """The wrist plate's three points: its centre, one along the tool, one along the plate's x."""
+    """Return the wrist plate's three points: its centre, one along the tool, one along the plate's x."""
     return (*plate.at_mm, *plate.point((0.0, 0.0, ARM_MM)), *plate.point((ARM_MM, 0.0, 0.0)))
 
 
 def pose_of(numbers: Sequence[float]) -> Pose | None:
-    """The wrist plate that three points say; None where they lie on a line or apart from each other by far too little.
+    """Return the wrist plate that three points define; None where they lie on a line or far too close together.
 
     The tool axis goes from the first point to the second; the third says where x is, as well as it can be square to that.
 

@@ -87,7 +87,7 @@ def _spelling(column: str, names: Mapping[str, Mapping[int, str]]) -> _Spell:
 
 
 def _value(value: Any) -> str:
-    """Return a value as it is read."""
+    """Return a value as people read it."""
     if value is None:
         return NOTHING
     return _number(value) if isinstance(value, float) else str(value)
@@ -101,7 +101,7 @@ def _number(value: float) -> str:
 
 
 def _fixture(text: str | None) -> str:
-    """`bed 90 x 40 x 60 mm, open 50 mm` of the numbers of a fixture; they were checked as the database was read."""
+    """Describe a fixture by its numbers, `bed 90 x 40 x 60 mm, open 50 mm`; they were checked as the database was read."""
     if text is None:
         return NOTHING
     said = []

@@ -44,7 +44,7 @@ class Blob:
 
 
 def blobs(picture: Floats, threshold: float) -> list[Blob]:
-    """The patches above the threshold that do not touch the picture's border, from the top."""
+    """Find the patches above the threshold that do not touch the picture's border, from the top."""
     labels, count = label(picture > threshold)
     cut = {int(n) for edge in (labels[0], labels[-1], labels[:, 0], labels[:, -1]) for n in np.unique(edge)}
     sizes = np.bincount(labels.ravel(), minlength=count + 1)
@@ -53,7 +53,7 @@ def blobs(picture: Floats, threshold: float) -> list[Blob]:
 
 
 def label(mask: Mask) -> tuple[Labels, int]:
-    """The mask's 4-connected components, numbered from 1 in the order of their first pixels; 0 elsewhere.
+    """Label the mask's 4-connected components, numbered from 1 in the order of their first pixels; 0 elsewhere.
 
     Runs of each row are joined to the runs of the row above that they touch.
 
@@ -73,7 +73,7 @@ def label(mask: Mask) -> tuple[Labels, int]:
 
 
 def _joined(runs: list[tuple[int, int]], first: list[int]) -> list[int]:
-    """For each run another of its component, or itself; `first` has each row's first run and the number of all."""
+    """Return for each run another of its component, or itself; `first` has each row's first run and the number of all."""
     roots = list(range(len(runs)))
     for above, here, after in zip(first, first[1:], first[2:], strict=False):
         old = above
@@ -97,7 +97,7 @@ def _root(roots: list[int], at: int) -> int:
 
 
 def grown(mask: Mask) -> Mask:
-    """The mask and every pixel beside it, also at a corner."""
+    """Return the mask and every pixel beside it, also at a corner."""
     wide = np.pad(mask, 1)
     tall = wide[:-2] | wide[1:-1] | wide[2:]
     full: Mask = tall[:, :-2] | tall[:, 1:-1] | tall[:, 2:]
@@ -105,7 +105,7 @@ def grown(mask: Mask) -> Mask:
 
 
 def _blob(picture: Floats, labels: Labels, number: int) -> Blob:
-    """One patch, from the part of the picture around it."""
+    """Measure one patch, from the part of the picture around it."""
     rows, columns = np.nonzero(labels == number)
     top, left = max(rows.min() - AROUND_PX, 0), max(columns.min() - AROUND_PX, 0)
     window = (slice(top, rows.max() + AROUND_PX + 1), slice(left, columns.max() + AROUND_PX + 1))
@@ -114,7 +114,7 @@ def _blob(picture: Floats, labels: Labels, number: int) -> Blob:
 
 
 def _cover(picture: Floats, labels: Labels, number: int) -> Floats:
-    """The share of each pixel that the patch covers."""
+    """Return the share of each pixel that the patch covers."""
     body = labels == number
     inner = ~grown(~body)
     outer = grown(body)
@@ -129,7 +129,7 @@ def _cover(picture: Floats, labels: Labels, number: int) -> Floats:
 
 
 def _moments(cover: Floats, top: float, left: float) -> Blob:
-    """Area, middle and axes; the middle of the first pixel is at a half."""
+    """Return area, middle and axes; the middle of the first pixel is at a half."""
     area = float(cover.sum())
     across, down = cover.sum(axis=0), cover.sum(axis=1)
     columns, rows = np.arange(cover.shape[1]) + 0.5, np.arange(cover.shape[0]) + 0.5
@@ -144,6 +144,6 @@ def _moments(cover: Floats, top: float, left: float) -> Blob:
 
 
 def half_turn(angle_rad: float) -> float:
-    """The same line's angle in (-pi/2, pi/2]."""
+    """Return the same line's angle in (-pi/2, pi/2]."""
     turned = np.pi / 2 - (np.pi / 2 - angle_rad) % np.pi
     return float(turned)

@@ -47,7 +47,7 @@ class Camera:
         self._is_part = np.append(model.geom_group == PART_GROUP, False)
 
     def _check_calibration(self) -> None:
-        """The model's camera against the optics, in the model's first position."""
+        """Check the model's camera against the optics, in the model's first position."""
         model, optics = self._model, self._optics
         fovy_deg = float(model.cam_fovy[self._camera])
         if abs(fovy_deg - optics.fovy_deg) > 1e-6:
@@ -61,7 +61,7 @@ class Camera:
             raise ValueError(f"site `{PROJECTOR}` is at {at_mm.round(2)} mm from the camera, not at {wanted}")
 
     def flood(self, data: mujoco.MjData, rng: np.random.Generator) -> FloodImage:
-        """The picture by a flash beside the lens: a face is the brighter the nearer it is and the more it faces the camera."""
+        """Take a picture by a flash beside the lens: a face is brighter the nearer it is and the more it faces the camera."""
         optics = self._optics
         geoms, depth_m, normals = self._cast(data, self._pixels)
         flat = self._shade(self._pixels, geoms, depth_m, normals)
@@ -72,7 +72,7 @@ class Camera:
         return FloodImage(intensity + rng.normal(0.0, optics.noise, shape))
 
     def lines(self, data: mujoco.MjData, rng: np.random.Generator) -> LineImage:
-        """Where the two light planes are seen: they leave the projector along camera x and fall toward the axis."""
+        """Take a picture of the two light planes: they leave the projector along camera x and fall toward the axis."""
         optics = self._optics
         columns = np.arange(optics.width_px, dtype=np.float64) + 0.5
         across = self._rays(columns, np.zeros_like(columns))[:, 0]
@@ -86,7 +86,7 @@ class Camera:
         return LineImage((first, second))
 
     def _lit(self, data: mujoco.MjData, rays: Floats) -> Floats:
-        """Where light along the rays ends, in camera axes, shape (n, 3), m; NaN where the camera does not see it."""
+        """Return where light along the rays ends, in camera axes, shape (n, 3), m; NaN where the camera does not see it."""
         light = self._light(data)
         geoms, depth, _ = self._cast(data, rays, light)
         points = light + rays * depth[:, None]
@@ -97,7 +97,7 @@ class Camera:
         return points
 
     def _peaks(self, points: Floats, noise_px: Floats) -> Floats:
-        """Columns and rows of points, with the sensor's noise and steps, within the picture."""
+        """Return columns and rows of points, with the sensor's noise and steps, within the picture."""
         optics = self._optics
         depth = -points[:, 2]
         column = optics.width_px / 2 + optics.focal_px * points[:, 0] / depth
@@ -107,20 +107,20 @@ class Camera:
         return np.stack([column, row], axis=1)[inside]
 
     def _light(self, data: mujoco.MjData) -> Floats:
-        """The projector in camera axes, in m."""
+        """Return the projector in camera axes, in m."""
         turn = data.cam_xmat[self._camera].reshape(3, 3)
         light: Floats = (data.site_xpos[self._projector] - data.cam_xpos[self._camera]) @ turn
         return light
 
     def _rays(self, columns: Floats, rows: Floats) -> Floats:
-        """Directions in camera axes, shape (n, 3), one long along the axis: a ray's length is then its depth."""
+        """Return directions in camera axes, shape (n, 3), one long along the axis: a ray's length is then its depth."""
         optics = self._optics
         x = (columns - optics.width_px / 2) / optics.focal_px
         y = (optics.height_px / 2 - rows) / optics.focal_px
         return np.stack([x, y, -np.ones_like(x)], axis=1)
 
     def _averaged(self, data: mujoco.MjData, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Floats:
-        """What pixels on edges collect over their area."""
+        """Return the mean intensity that pixels on edges collect over their area."""
         inside = (np.arange(SUBRAYS) + 0.5) / SUBRAYS
         right, down = (grid.ravel() for grid in np.meshgrid(inside, inside))
         rays = self._rays((columns[:, None] + right).ravel(), (rows[:, None] + down).ravel())
@@ -130,7 +130,7 @@ class Camera:
     def _cast(
         self, data: mujoco.MjData, rays: Floats, start: Floats | None = None
     ) -> tuple[NDArray[np.int32], Floats, Floats]:
-        """What rays from a point of the camera's axes hit: geoms (-1 none), lengths in rays, normals in the world's axes."""
+        """Cast rays from a point of the camera's axes; return geoms (-1 none), lengths in rays, normals in camera axes."""
         turn = data.cam_xmat[self._camera].reshape(3, 3)
         origin = data.cam_xpos[self._camera] + (0.0 if start is None else turn @ start)
         count = len(rays)
@@ -143,7 +143,7 @@ class Camera:
         return geoms, length, (normals.reshape(-1, 3) @ turn)
 
     def _shade(self, rays: Floats, geoms: NDArray[np.int32], depth_m: Floats, normals: Floats) -> Floats:
-        """Matt surfaces under a lamp at the lens: reflectance * cosine / distance^2.
+        """Shade matt surfaces under a lamp at the lens: reflectance * cosine / distance^2.
 
         Source: Lambert's law and the inverse square law.
         """
@@ -155,12 +155,12 @@ class Camera:
 
 
 def _fan(across: Floats, fall: float) -> Floats:
-    """A light plane's rays in camera axes, shape (n, 3)."""
+    """Return a light plane's rays in camera axes, shape (n, 3)."""
     return np.stack([across, np.full_like(across, -fall), -np.ones_like(across)], axis=1)
 
 
 def _edges(geoms: NDArray[np.int32], normals: Floats, is_part: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Pixels beside one that shows another face, where one of the two is a part's: nobody measures furniture."""
+    """Find pixels beside one that shows another face, where one of the two is a part's: nobody measures furniture."""
     edge = np.zeros(geoms.shape, bool)
     for here, there in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
         differ = geoms[here] != geoms[there]

@@ -21,7 +21,7 @@ ALIKE = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Features:
-    """What the database knows of a part's top: its length and width in mm, in either order."""
+    """The features of a part's top in the database: its length and width in mm, in either order."""
 
     length_mm: float
     width_mm: float
@@ -50,7 +50,7 @@ class Patch:
 
 @dataclass(frozen=True, slots=True)
 class FoundPart:
-    """What FLOOD-FLASH says of the part.
+    """The answer of FLOOD-FLASH about the part.
 
     Attributes:
         x_mm: The part's middle, to the right of the camera's axis, at the expected range.
@@ -70,7 +70,7 @@ class FoundPart:
 def find(
     image: FloodImage, wanted: Features, expected_range_mm: float, optics: Optics = STANDARD
 ) -> FoundPart | None:
-    """The part that matches best and, of those alike, is nearest to the middle of the picture; None if none matches.
+    """Find the part that matches best and, of those alike, is nearest to the middle of the picture; None if none matches.
 
     Raises:
         ValueError: The expected range is not positive, or a side of the wanted top is not.
@@ -81,7 +81,7 @@ def find(
 
 
 def reflectance(image: FloodImage, expected_range_mm: float, optics: Optics) -> Floats:
-    """The picture made even: each pixel over what a white surface at the expected range that faces the camera would have.
+    """Even out the picture: divide each pixel by that of a white surface at the expected range that faces the camera.
 
     Such a surface is seen at a cosine c and at a distance of range / c, so the flash falls off with c^3 across the picture.
     """
@@ -93,7 +93,7 @@ def reflectance(image: FloodImage, expected_range_mm: float, optics: Optics) -> 
 
 
 def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Patch:
-    """A patch in mm at the expected range."""
+    """Return a patch in mm at the expected range."""
     scale_mm = expected_range_mm / optics.focal_px
     return Patch(
         (blob.column_px - optics.width_px / 2) * scale_mm,
@@ -126,7 +126,7 @@ def choose(shapes: Iterable[Patch], wanted: Features, expected_range_mm: float) 
 
 
 def mismatch(seen: Patch, wanted: Features) -> float:
-    """Relative differences of area, length and width, added."""
+    """Return the sum of the relative differences of area, length and width."""
     length_mm = max(wanted.length_mm, wanted.width_mm)
     width_mm = min(wanted.length_mm, wanted.width_mm)
     return (

@@ -59,7 +59,7 @@ def perceive(
     rng: np.random.Generator,
     optics: Optics = STANDARD,
 ) -> FoundPart | None:
-    """What FLOOD-FLASH says when these tops are there, each facing the camera.
+    """Return the answer of FLOOD-FLASH for these tops, each facing the camera.
 
     Raises:
         ValueError: The expected range is not positive, or a side of the wanted top is not.
@@ -74,7 +74,7 @@ def perceive(
 
 
 def _inside(top: Top, optics: Optics) -> bool:
-    """Whether the top lies in the picture whole."""
+    """Tell whether the whole top lies in the picture."""
     scale = optics.focal_px / top.range_mm
     c, s = abs(cos(top.roll_rad)), abs(sin(top.roll_rad))
     right = abs(top.x_mm) + (top.length_mm * c + top.width_mm * s) / 2
@@ -83,7 +83,7 @@ def _inside(top: Top, optics: Optics) -> bool:
 
 
 def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Optics) -> Patch:
-    """A top's patch at the expected range, with errors of place along and across, of turn and of area.
+    """Return a top's patch at the expected range, with errors of place along and across, of turn and of area.
 
     Each pixel of the border is off by e on its own. For sides l and w in pixels, the border's first moments give a middle
     off by e sqrt(l / 6 + w / 2) / w along l; its product moment a turn off by e sqrt((l + w) / 24) 12 / |l^2 - w^2|; its length an
@@ -114,17 +114,17 @@ def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Op
 
 
 def _edge_px(range_mm: float, optics: Optics) -> float:
-    """Standard deviation of where an edge is seen in a pixel, at a range."""
+    """Return the standard deviation, in pixels, of the place where an edge is seen, at a range."""
     return hypot(EDGE_PX, EDGE_OF_NOISE_PX * optics.noise * (range_mm / optics.bright_mm) ** 2)
 
 
 def _share(offset_mm: float) -> float:
-    """How much of the side that faces the axis shows, signed as the offset is."""
+    """Return the share of the side facing the axis that shows, signed as the offset is."""
     return max(-1.0, min(1.0, offset_mm / SIDE_MM))
 
 
 def perceive_surface(top: Top, rng: np.random.Generator, optics: Optics = STANDARD) -> Surface | None:
-    """What LINE-FLASH says of a top under the axis; None where a light plane misses it.
+    """Return the answer of LINE-FLASH for a top under the axis; None where a light plane misses it.
 
     The fitted plane's numbers have the covariance of least squares, row variance * (X^T X)^-1 over the columns in which the lines cross
     the top. Both planes turned by d put the range off by z^2 / b (1 + slope^2) d: from z = b / (s + slope).
@@ -151,7 +151,7 @@ def perceive_surface(top: Top, rng: np.random.Generator, optics: Optics = STANDA
 
 
 def _crossed(top: Top, slope: float, optics: Optics) -> Floats:
-    """Where one light plane crosses the top, column by column: rows of 1, x and y in mm, shape (n, 3)."""
+    """Return where one light plane crosses the top, column by column: rows of 1, x and y in mm, shape (n, 3)."""
     y = optics.baseline_mm - slope * top.range_mm
     apart = top.range_mm / optics.focal_px
     half = hypot(top.length_mm, top.width_mm) / 2

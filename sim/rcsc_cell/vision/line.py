@@ -26,7 +26,7 @@ LEAST_POINTS = 4
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """What LINE-FLASH says.
+    """The answer of LINE-FLASH.
 
     Attributes:
         range_mm: From the camera along its axis to the surface.
@@ -41,13 +41,13 @@ class Surface:
     points: int
 
     def angle_rad(self, expected: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> float:
-        """Between the measured and an expected unit normal, in radians."""
+        """Return the angle between the measured and an expected unit normal, in radians."""
         cosine = sum(a * b for a, b in zip(self.normal, expected, strict=True))
         return acos(min(1.0, max(-1.0, cosine)))
 
 
 def measure(image: LineImage, expected_range_mm: float, optics: Optics = STANDARD) -> Surface | None:
-    """The surface on the camera's axis, whether or not it is at the expected range; None where there is none near that.
+    """Measure the surface on the camera's axis, at or near the expected range; return None where there is none.
 
     Raises:
         ValueError: The expected range is not positive.
@@ -68,7 +68,7 @@ def measure(image: LineImage, expected_range_mm: float, optics: Optics = STANDAR
 
 
 def triangulate(peaks_px: Floats, slope: float, optics: Optics) -> Floats:
-    """Points of one light plane, shape (n, 3): camera x, camera y and range, in mm.
+    """Return points of one light plane, shape (n, 3): camera x, camera y and range, in mm.
 
     The plane has y = b - slope * z, the sensor's ray has y = s * z, so z = b / (s + slope).
     """
@@ -80,7 +80,7 @@ def triangulate(peaks_px: Floats, slope: float, optics: Optics) -> Floats:
 
 
 def _near(points: Floats, expected_range_mm: float) -> Floats:
-    """The points beside the axis and near the expected range, from the left."""
+    """Return the points beside the axis and near the expected range, from the left."""
     near = np.abs(points[:, 2] - expected_range_mm) <= WINDOW_MM
     near &= np.abs(points[:, 0]) <= REACH_MM
     kept: Floats = points[near]
@@ -88,7 +88,7 @@ def _near(points: Floats, expected_range_mm: float) -> Floats:
 
 
 def _middle_piece(points: Floats, spread_mm: float) -> Floats:
-    """The straight piece of a line that crosses the axis: the part's top, without what the line meets beside it.
+    """Return the straight piece of a line that crosses the axis: the part's top, without whatever the line meets beside it.
 
     Of all ways to cut the line into straight pieces, the one with the least sum of squared residuals, in variances, and of `BREAK` a piece.
 
@@ -116,7 +116,7 @@ def _middle_piece(points: Floats, spread_mm: float) -> Floats:
 
 
 def _squares(x: Floats, z: Floats, spread_mm: float) -> Floats:
-    """Sums of squared residuals of z from a straight line in x, for each run [first, after), shape (n + 1, n + 1).
+    """Return sums of squared residuals of z from a straight line in x, for each run [first, after), shape (n + 1, n + 1).
 
     From running sums about the run's means: Szz - Sxz^2 / (Sxx + (spread / lean)^2), the least of the squared residuals and of the
     squared slope, each in its own variance.
@@ -130,19 +130,19 @@ def _squares(x: Floats, z: Floats, spread_mm: float) -> Floats:
 
 
 def _runs(values: Floats) -> Floats:
-    """Sums over each run [first, after)."""
+    """Return the sum over each run [first, after)."""
     total = np.concatenate([[0.0], np.cumsum(values)])
     runs: Floats = total[None, :] - total[:, None]
     return runs
 
 
 def _fit(points: Floats) -> Floats:
-    """Least squares of range = p0 + p1 x + p2 y."""
+    """Fit range = p0 + p1 x + p2 y by least squares."""
     columns = np.column_stack([np.ones(len(points)), points[:, :2]])
     return np.asarray(np.linalg.lstsq(columns, points[:, 2], rcond=None)[0], np.float64)
 
 
 def surface(plane: Floats, spread_mm: float, points: int) -> Surface:
-    """A plane's range and normal: its points have -z = p0 + p1 x + p2 y in camera axes, where z points back."""
+    """Return a plane's range and normal: its points have -z = p0 + p1 x + p2 y in camera axes, where z points back."""
     x, y, z = (np.append(plane[1:], 1.0) / np.sqrt(1.0 + plane[1:] @ plane[1:])).tolist()
     return Surface(float(plane[0]), (x, y, z), spread_mm, points)

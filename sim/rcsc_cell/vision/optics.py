@@ -61,17 +61,17 @@ class Optics:
 
     @property
     def slopes(self) -> tuple[float, float]:
-        """How fast each light plane falls toward the camera's axis, in mm a mm of range: the tangents of their angles."""
+        """The fall of each light plane toward the camera's axis, in mm a mm of range: the tangents of their angles."""
         high, low = self.baseline_mm - self.apart_mm, self.baseline_mm + self.apart_mm
         return high / self.middle_mm, low / self.middle_mm
 
     @property
     def row_px(self) -> float:
-        """Standard deviation of a told row: the peak's noise and the step's."""
+        """The standard deviation of a measured row: the peak's noise and the step's."""
         return float(np.hypot(self.peak_px, self.step_px / np.sqrt(12.0)))
 
     def range_of_row_mm(self, range_mm: float) -> float:
-        """What one row is worth in range: z = b / (s + t), s = y / z, so dz = z^2 / (f b) dv."""
+        """Return the range that one row is worth, in mm: z = b / (s + t), s = y / z, so dz = z^2 / (f b) dv."""
         return range_mm**2 / (self.focal_px * self.baseline_mm)
 
 
@@ -98,7 +98,7 @@ class FloodImage:
 
 @dataclass(frozen=True, slots=True)
 class LineImage:
-    """Where the sensor sees each of the two light planes.
+    """The peaks of the two light planes in a picture.
 
     Attributes:
         peaks_px: For each plane, shape (n, 2): column and row of the line's middle, at most one a column; the picture's upper

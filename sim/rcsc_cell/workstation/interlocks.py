@@ -16,7 +16,7 @@ CLEAR_OF_MACHINE = ("FIX-SAFE", "WS-SAFE", "BUFFER-SAFE", "V-BLK2")
 
 @dataclass(frozen=True, slots=True)
 class CellState:
-    """What the workstation knows: the jaws, what is in the fixture and in the hand, and where the robot ended."""
+    """The cell as the workstation knows it: the jaws, the parts in fixture and hand, and the place where the robot ended."""
 
     right_open: bool = True
     left_open: bool = True
@@ -26,7 +26,7 @@ class CellState:
 
 
 def refusal(cell: CellState, row: ScriptRow) -> str:
-    """Why the row must not be done now; empty when it may."""
+    """Return the reason why the row must not be done now; empty when it may."""
     if row.machine:
         return _machine(cell)
     if row.vise:
@@ -53,7 +53,7 @@ def _vise(cell: CellState, row: ScriptRow) -> str:
 
 
 def taken_from(cell: CellState, row: ScriptRow) -> str:
-    """Where the row takes a part from; an ACQUIRE without a source takes it where the robot is (section 3.1)."""
+    """Return the place where the row takes a part; an ACQUIRE without a source takes it where the robot is (section 3.1)."""
     return row.source or (cell.robot_at if row.robot == "acquire" else "")
 
 
@@ -78,7 +78,7 @@ def _robot(cell: CellState, row: ScriptRow) -> str:
 
 
 def after(cell: CellState, row: ScriptRow) -> CellState:
-    """The cell when the row is done."""
+    """Return the cell when the row is done."""
     if row.vise:
         return replace(
             cell,

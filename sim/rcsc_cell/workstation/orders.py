@@ -31,7 +31,7 @@ CLOSED_MM = 3.0
 
 
 def ajar(report: Values, *, right_open: bool, left_open: bool) -> str:
-    """Which jaw does not stand as it should, and where it stands; empty when both do."""
+    """Return which jaw does not stand as it should, and its place; empty when both do."""
     for jaw, opened, at_mm in (("right", right_open, report[2]), ("left", left_open, report[3])):
         if not (at_mm > OPEN_MM if opened else at_mm < CLOSED_MM):
             return f"the {jaw} jaw did not {'open' if opened else 'close'}: it stands at {at_mm:.1f} mm"

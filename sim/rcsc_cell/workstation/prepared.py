@@ -32,7 +32,7 @@ class ScriptDraft:
     database: Database
 
     def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult]:
-        """Runs to the end of the script, or to what stops it and until TASK has paused; each result as it comes.
+        """Run to the end of the script, or until TASK has paused after a failure; yield each result as it comes.
 
         Raises:
             StateTableError: A level met a fault that the proofs exclude.
@@ -42,10 +42,10 @@ class ScriptDraft:
 
 
 def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
-    """Names of parts as the tables have them.
+    """Return the names of parts in the tables.
 
     Raises:
-        BadDescription: No level has any.
+        BadDescription: No level has a part.
     """
     leaves = signs["task"].leaves if "task" in signs else ()
     parts = next((leaf.members for leaf in leaves if leaf.name == "workstation.obj"), ())
@@ -57,7 +57,7 @@ def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
 
 
 def limits_of(system: Description, signs: Mapping[str, Signature]) -> dict[str, list[list[Limit | None]]]:
-    """Return what the levels can hold of each answer of the database, by query."""
+    """Return the limits of the levels for each answer of the database, by query."""
     limits: dict[str, list[list[Limit | None]]] = {}
     for spec in system.levels:
         for feed in spec.feeds:
@@ -79,7 +79,7 @@ def database_path(system: Description) -> Path:
 
 
 def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
-    """Refuse a system that workstation, robot, hand and camera of the cell cannot be put beside.
+    """Refuse a system that does not fit the workstation, robot, hand and camera of the cell.
 
     Raises:
         BadDescription: A buffer or a word that they need is not there; every one is told.
@@ -141,11 +141,11 @@ WORDS: Mapping[tuple[str, str], tuple[str, ...]] = {
 
 
 def database_of(system: Description, signs: Mapping[str, Signature], path: Path | None = None) -> Database:
-    """The database, made anew where the data has changed; as it is where `path` says which.
+    """Open the database, built anew where the data has changed; open `path` as it is where it is given.
 
     Raises:
         BadData: The data or the file is not in order.
-        BadDescription: It names no data.
+        BadDescription: The description names no data.
     """
     if path is not None:
         return open_database(path)
@@ -157,13 +157,13 @@ def database_of(system: Description, signs: Mapping[str, Signature], path: Path 
 
 
 def script_path(name: str, system: Path) -> Path:
-    """The script that a name means: a file, or one of those that stand with the system."""
+    """Find the script that a name means: a file, or one of those beside the system."""
     path = Path(name)
     return path if path.suffix == ".csv" or path.is_file() else system.parent / "scripts" / f"{name}.csv"
 
 
 def safe_places(database: Database) -> dict[str, str]:
-    """The safe location of each location that has one, by name."""
+    """Return the safe location of each location that has one, by name."""
     names = {number: name for name, number in database.locations.items()}
     safe = {name: int(database.place(number)[4]) for name, number in database.locations.items()}
     return {name: names[number] for name, number in safe.items() if number}
@@ -176,7 +176,7 @@ def prepare(
     outside: Callable[[Database], Iterable[Outside]],
     database: Path | None = None,
 ) -> ScriptDraft:
-    """A cell ready for its first tick.
+    """Prepare a cell for its first tick.
 
     Args:
         path: The system's description.

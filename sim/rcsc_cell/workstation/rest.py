@@ -19,7 +19,7 @@ MOVE_FAILED = "move"
 
 @dataclass(slots=True)
 class Progress:
-    """How far a row has come, over all its tries.
+    """The progress of a row, over all its tries.
 
     Attributes:
         tried: It has been begun before.
@@ -34,22 +34,22 @@ class Progress:
     before: CellState = field(default_factory=CellState)
 
     def begin(self, cell: CellState) -> None:
-        """The row is tried, for the first time or again."""
+        """Note that the row is tried, for the first time or again."""
         if not self.tried:
             self.tried, self.before = True, cell
 
     def seen(self, in_gripper: str) -> None:
-        """TASK says what is in the gripper."""
+        """Note a report by TASK of the part in the gripper."""
         self.taken = self.taken or in_gripper != NOTHING
 
     def failed(self, row: ScriptRow, in_gripper: str, failure: str) -> None:
-        """TASK has given up."""
+        """Note a failure of TASK."""
         lets_go = row.robot in PUTS and in_gripper == NOTHING
         self.put = self.put or (self.taken and lets_go and failure == MOVE_FAILED)
 
 
 def stands(row: ScriptRow, progress: Progress, in_gripper: str, cell: CellState) -> CellState:
-    """The cell after a try that failed: what the gripper holds by TASK's word, and a part in the fixture that was put there."""
+    """Return the cell after a failed try: the gripper holds what TASK reports, and a part that was put into the fixture is there."""
     held = "" if in_gripper == NOTHING else in_gripper
     fixture = cell.fixture
     if progress.put and _put_at(row, progress) in FIXTURE:
@@ -58,12 +58,12 @@ def stands(row: ScriptRow, progress: Progress, in_gripper: str, cell: CellState)
 
 
 def _put_at(row: ScriptRow, progress: Progress) -> str:
-    """Where the row lets go of a part: at its destination, or where the robot was when it began."""
+    """Return the place where the row lets go of a part: its destination, or the place of the robot when it began."""
     return row.dest or progress.before.robot_at
 
 
 def rest(row: ScriptRow, progress: Progress, in_gripper: str, safe: Mapping[str, str]) -> ScriptRow:
-    """What is to be sent.
+    """Return the rest of a row, which is to be sent.
 
     Args:
         row: As the script has it.

@@ -43,7 +43,7 @@ class ScriptRow:
 
 
 def read_script(path: Path) -> tuple[ScriptRow, ...]:
-    """The rows of a script.
+    """Read the rows of a script.
 
     Raises:
         BadScript: The file cannot be read, or a row says nothing that a workstation can do.
@@ -90,7 +90,7 @@ def _row(number: int, line: Mapping[str, str]) -> ScriptRow:
 
 
 def _jaws(text: str) -> dict[str, bool]:
-    """`OPEN RIGHT, CLOSE LEFT` and the like."""
+    """Read `OPEN RIGHT, CLOSE LEFT` and the like."""
     jaws = {}
     for jaw in text.split(","):
         words = jaw.split()
@@ -101,7 +101,7 @@ def _jaws(text: str) -> dict[str, bool]:
 
 
 def _part(text: str) -> tuple[str, int]:
-    """`BOXT (2)`: a part, and which pair of faces the fingers take."""
+    """Read `BOXT (2)`: a part, and the pair of faces that the fingers take."""
     if not text:
         return "", 0
     match = re.fullmatch(r"([A-Z-]+)(?: \((\d)\))?", text)
@@ -111,7 +111,7 @@ def _part(text: str) -> tuple[str, int]:
 
 
 def _place(text: str) -> tuple[str, int]:
-    """`STATION(3)`: a location, and its sector."""
+    """Read `STATION(3)`: a location, and its sector."""
     match = re.fullmatch(r"([A-Z0-9-]*)(?:\((\d+)\))?", text)
     if match is None:
         raise ValueError(f"`{text}` is no location")

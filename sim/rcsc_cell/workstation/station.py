@@ -42,7 +42,7 @@ RUNNING: Now = ("running", "")
 
 @dataclass(frozen=True, slots=True)
 class RowResult:
-    """What became of a row; `ticks` has the cycle in which its end was seen."""
+    """The result of a row; `ticks` includes the cycle in which its end was seen."""
 
     row: ScriptRow
     state: State
@@ -53,7 +53,7 @@ class RowResult:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What a stopped workstation goes on from; its orders stand in their buffers."""
+    """The state from which a stopped workstation continues; its orders stand in their buffers."""
 
     at: int
     cell: CellState
@@ -114,12 +114,12 @@ class Workstation:
 
     @property
     def over(self) -> bool:
-        """Whether every row is done, or one was not."""
+        """True once every row is done, or one was not."""
         return self.at >= len(self.rows) or self.stopped is not None
 
     @property
     def at_rest(self) -> bool:
-        """Whether the PAUSE that follows a failure has been answered, or was waited for in vain."""
+        """True once the PAUSE that follows a failure has been answered, or the wait for that was in vain."""
         return self._paused < 0
 
     @property
@@ -129,13 +129,13 @@ class Workstation:
         return last if last is not None and last.state != "done" and last.row is self.rows[self.at] else None
 
     def resume(self) -> None:
-        """Tries the row that stopped the script again, once TASK has paused: what is left of it."""
+        """Try the rest of the row that stopped the script, once TASK has paused."""
         if self.stopped is not None:
             self.results.pop()
             self._since = -1
 
     def begin_at(self, row: int) -> None:
-        """Go on at another row, as if those between were done.
+        """Continue at another row, as if those between were done.
 
         Args:
             row: From 0; an earlier row leaves the cell as it is.
@@ -148,7 +148,7 @@ class Workstation:
             self.at, self.progress = row, Progress()
 
     def state(self) -> dict[str, Any]:
-        """What a stopped workstation goes on from, in plain values; its orders stand in their buffers."""
+        """Return the state from which a stopped workstation continues, in plain values; its orders stand in their buffers."""
         trouble = self.trouble if self.at_rest else "TASK has not paused"
         return cast(dict[str, Any], plain(_State(self.at, self.cell, self.progress, trouble)))
 
@@ -169,7 +169,7 @@ class Workstation:
 
     @property
     def _before(self) -> CellState:
-        """The cell as it was before the first try of the row under way: `after` is told of whole rows only."""
+        """The cell before the first try of the row under way: `after` takes whole rows only."""
         return self.progress.before if self.progress.tried else self.cell
 
     def _work(self, tick: int, latest: Latest) -> None:
@@ -269,7 +269,7 @@ class Workstation:
     # --- what is sent ---
 
     def _jaws(self, row: ScriptRow) -> tuple[bool, bool]:
-        """How the right and the left jaw are to stand; one that the row does not name stays as it is."""
+        """Return how the right and the left jaw are to stand; one that the row does not name stays as it is."""
         return row.vise.get("right", self.cell.right_open), row.vise.get("left", self.cell.left_open)
 
     def _tell(self, command: str, row: ScriptRow) -> None:
@@ -300,7 +300,7 @@ def workstation(
     task: Signature,
     safe: Mapping[str, str] | None = None,
 ) -> Workstation:
-    """A workstation that runs the rows from the first.
+    """Make a workstation that runs the rows from the first.
 
     Args:
         rows: The script.
@@ -336,7 +336,7 @@ def workstation(
 
 
 def _answered(who: str, report: Values | None, ticks: int, most: int) -> Now:
-    """How an order stands that has not failed: status is the report's second value."""
+    """Return the state of an order that has not failed: status is the report's second value."""
     if report is not None and report[1] == DONE:
         return "done", ""
     if report is None:
@@ -345,7 +345,7 @@ def _answered(who: str, report: Values | None, ticks: int, most: int) -> Now:
 
 
 def _reason(failure: str, cause: str) -> str:
-    """TASK's word for what failed, and after a colon what E-MOVE said of it, where that is another."""
+    """Return TASK's word for the failure, and after a colon E-MOVE's word, where that is another."""
     return failure if cause in ("none", failure) else f"{failure}: {cause}"
 
 

@@ -34,7 +34,7 @@ MOST = 6
 
 
 def about(names: Names, name: Occurrence, grids: Mapping[str, Grid]) -> str:
-    """What is known of a name; empty for nothing.
+    """Describe a name; return an empty text if nothing is known of it.
 
     Args:
         names: The files that it stands in.
@@ -47,7 +47,7 @@ def about(names: Names, name: Occurrence, grids: Mapping[str, Grid]) -> str:
 
 
 def _declared(names: Names, name: Occurrence, found: tuple[Occurrence, ...]) -> Iterator[str]:
-    """Yield how it is declared, with its doc lines."""
+    """Yield its declaration, with its doc lines."""
     for each in found[:MOST]:
         source = names.sources.get(each.span.file)
         if source is not None:
@@ -62,7 +62,7 @@ def _declared(names: Names, name: Occurrence, found: tuple[Occurrence, ...]) -> 
 
 
 def _head(name: Occurrence, source: Source) -> str:
-    """The first line of a declaration, or what it says of a member or a field."""
+    """Return the first line of a declaration, or the description of a member or a field."""
     match name.node:
         case tree.EnumDecl(declared, members) if name.space is Space.MEMBER:
             at = [member.text for member in members].index(name.text)
@@ -149,7 +149,7 @@ def _writers(program: Program, leaves: set[str]) -> Iterator[str]:
 
 
 def _range(kind: Type) -> str:
-    """The type, with what it takes."""
+    """Return the type, with its range or its members."""
     match kind:
         case Enum(name, members):
             return f"`{name}`, one of {_listed([f'`{member}`' for member in members])}"
@@ -178,12 +178,12 @@ def _line(grid: Grid, name: str) -> Iterator[str]:
 
 
 def said(standing: Standing) -> str:
-    """A standing in a sentence."""
+    """Return a standing as a sentence."""
     return f"**{standing.state.value}**: {standing.why}"
 
 
 def share_text(count: int, whole: int) -> str:
-    """A share of the inputs, as percent of three digits; never 0 % for what is possible, nor 100 % for less than all.
+    """Return a share of the inputs in percent, three digits; never 0 % for what is possible, nor 100 % for less than all.
 
     >>> share_text(1, 4), share_text(0, 4), share_text(1, 10**9), share_text(10**9 - 1, 10**9)
     ('25 %', '0 %', '< 0.001 %', '> 99.9 %')

@@ -35,7 +35,7 @@ _FUNCTIONS = ("abs", "min", "max", "count", "int", "real", "single")
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """Something that could be written.
+    """A completion.
 
     Attributes:
         kind: `member`, `variable`, `constant`, `procedure`, `type`, `field`, `table`, `claim`, `keyword`, `value`, `file`, `line`, `unit`.
@@ -49,7 +49,7 @@ class Offer:
 
 
 def offers(names: Names, grids: Mapping[str, Grid], file: str, offset: int) -> tuple[Offer, ...]:
-    """What could stand at an offset.
+    """Return the completions at an offset.
 
     Args:
         names: The files.
@@ -75,13 +75,13 @@ class _Complete:
 
     @property
     def program(self) -> Program | None:
-        """What is known."""
+        """The program, as far as it is known."""
         return self.names.program
 
     # --- in tables ---
 
     def in_table(self, text: str, offset: int) -> Iterator[Offer]:
-        """Yield what could stand in a cell."""
+        """Yield the completions in a cell."""
         table = next((each for each in tables_of(text) if each.start <= offset <= each.end), None)
         row = (
             None
@@ -115,7 +115,7 @@ class _Complete:
         yield from self.cell(column, after, first=at == 1)
 
     def column(self, columns: Sequence[GridColumn], heading: Sequence[RowText], at: int) -> GridColumn | None:
-        """The column of a cell, by where its heading stands."""
+        """Return the column of a cell, by the place of its heading."""
         cells = cells_of(heading[0]).all
         if at >= len(cells):
             return None
@@ -123,7 +123,7 @@ class _Complete:
         return next((each for each in columns if each.areas[0].start == place), None)
 
     def heading(self, after: bool) -> Iterator[Offer]:
-        """Yield what could head a column."""
+        """Yield the completions of a heading."""
         words = ("procedures", "command_out", "status_out", "req") if after else ("when",)
         yield from (Offer(word, "keyword") for word in words)
         for declared in self.program.declared if self.program else ():
@@ -132,7 +132,7 @@ class _Complete:
             yield Offer(declared.name, "variable", _typed(declared.type), declared.doc)
 
     def cell(self, column: GridColumn | None, after: bool, *, first: bool) -> Iterator[Offer]:
-        """Yield what could stand under a heading."""
+        """Yield the completions under a heading."""
         if column is not None and column.kind == "procedures":
             yield from self.procedures()
             return
@@ -151,7 +151,7 @@ class _Complete:
             yield from self.members()
 
     def kind(self, column: GridColumn) -> Type | None:
-        """The type under a heading."""
+        """Return the type under a heading."""
         if self.program is None:
             return None
         leaf = next((each.type for each in self.program.variables if each.name == column.heading), None)
@@ -162,7 +162,7 @@ class _Complete:
     # --- elsewhere ---
 
     def outside(self, before: str) -> Iterator[Offer]:
-        """Yield what could stand after the beginning of a line."""
+        """Yield the completions after the beginning of a line."""
         if field := _FIELD.search(before):
             yield from self.fields(field[1])
         elif not before.strip() or re.fullmatch(r"\s*\w+", before):
@@ -188,7 +188,7 @@ class _Complete:
             yield from self.expression()
 
     def inner(self) -> Iterator[Offer]:
-        """Yield what begins a line inside braces."""
+        """Yield the words that begin a line inside braces."""
         yield from (
             Offer(word, "keyword")
             for word in ("if", "case", "for", "local", "next", "else", "period", "preprocess", "postprocess")
@@ -197,7 +197,7 @@ class _Complete:
         yield from self.variables(None)
 
     def expression(self) -> Iterator[Offer]:
-        """Yield what could stand in an expression."""
+        """Yield the completions in an expression."""
         yield from self.variables(None)
         yield from self.members()
         yield from (Offer(word, "procedure", "function") for word in _FUNCTIONS)
@@ -207,7 +207,7 @@ class _Complete:
         )
 
     def fields(self, base: str) -> Iterator[Offer]:
-        """Yield the parts of what stands before a dot."""
+        """Yield the parts of the expression before a dot."""
         kind: Type | None = None
         for declared in self.program.declared if self.program else ():
             if declared.name == base.partition(".")[0].partition("[")[0]:
@@ -278,7 +278,7 @@ class _Complete:
             yield from (Offer(member, "member", enum.name) for member in enum.members)
 
     def declared(self, space: Space) -> list[str]:
-        """The names declared in a space."""
+        """Return the names declared in a space."""
         return list(
             dict.fromkeys(each.text for each in self.names.every() if each.declares and each.space is space)
         )

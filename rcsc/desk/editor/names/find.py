@@ -47,7 +47,7 @@ class Names:
     _of: dict[str, tuple[Occurrence, ...]] = field(default_factory=dict)
 
     def of(self, file: str) -> tuple[Occurrence, ...]:
-        """The names of one file."""
+        """Return the names of one file."""
         if file not in self._of:
             self._of[file] = tuple(occurrences(self.files[file])) if file in self.files else ()
         return self._of[file]
@@ -58,7 +58,7 @@ class Names:
             yield from self.of(file)
 
     def at(self, file: str, offset: int) -> Occurrence | None:
-        """The name at an offset, or that ends there; by its word alone where nothing is parsed."""
+        """Return the name at an offset, or that ends there; by its word alone where nothing is parsed."""
         for each in self.of(file):
             if any(span.start <= offset <= span.end for span in (each.span, *each.further)):
                 return each
@@ -71,7 +71,7 @@ class Names:
         return None if space is None else Occurrence(space, text, word)
 
     def word(self, file: str, offset: int) -> Span | None:
-        """The word around an offset, outside comments."""
+        """Return the word around an offset, outside comments."""
         if file not in self.sources:
             return None
         text = self.sources[file].text
@@ -84,7 +84,7 @@ class Names:
         return None
 
     def declarations(self, name: Occurrence) -> tuple[Occurrence, ...]:
-        """Where a name is declared; of what the protocol makes, the neighbour that it is made for."""
+        """Return the declarations of a name; for one that the protocol makes, the neighbour that it is made for."""
         found = tuple(each for each in self.every() if each.declares and same(each, name))
         if found or name.space is not Space.VALUE or self.program is None:
             return found
@@ -92,11 +92,11 @@ class Names:
         return tuple(Occurrence(Space.PEER, name.text, span, "", True) for span in spans)
 
     def uses(self, name: Occurrence) -> tuple[Occurrence, ...]:
-        """Every place where a name stands, its declarations included."""
+        """Return every occurrence of a name, its declarations included."""
         return tuple(each for each in self.every() if same(each, name))
 
     def file_used(self, name: Occurrence) -> str | None:
-        """The file that a `use` means."""
+        """Return the file that a `use` names."""
         folder = os.path.dirname(name.span.file)
         wanted = [file for file in self.sources if file.endswith(f"{name.text}.rcs")]
         beside = os.path.normpath(os.path.join(folder, f"{name.text}.rcs"))
@@ -104,7 +104,7 @@ class Names:
 
 
 def same(one: Occurrence, other: Occurrence) -> bool:
-    """Whether two occurrences name the same thing; a value may be a member of an enumeration."""
+    """Tell whether two occurrences name the same thing; a value may be a member of an enumeration."""
     if one.text != other.text or one.owner != other.owner:
         return False
     if one.space is Space.LINE or other.space is Space.LINE:

@@ -14,7 +14,7 @@ from rcsc.lang.syntax.rows import Cell
 
 
 class Space(StrEnum):
-    """What a name names; names of two spaces never clash."""
+    """The kind of thing that a name stands for; names of two spaces never clash."""
 
     VALUE = "value"  # variables, constants and sets; a use may be of a member or a local, too
     MEMBER = "member"
@@ -33,7 +33,7 @@ class Space(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """A name where it stands.
+    """An occurrence of a name.
 
     Attributes:
         owner: The procedure of a local, the table of a line; else empty.
@@ -71,7 +71,7 @@ class _Walk:
     locals: frozenset[str] = frozenset()
 
     def at(self, span: Span) -> list[Span]:
-        """The places in the file: of a name that is broken in a heading one a row."""
+        """Return the places in the file: a name broken in a heading has one a row."""
         if span.file or self.cell is None:
             return [span]
         start, end = span.start + self.shift, span.end + self.shift
@@ -79,7 +79,7 @@ class _Walk:
         return [self.cell.at(*cut) for cut in pairwise(cuts)]
 
     def name(self, space: Space, name: tree.Name, node: object = None, owner: str = "") -> Occurrence:
-        """One occurrence; a declaration if it has a node."""
+        """Return one occurrence; a declaration if it has a node."""
         span, *further = self.at(name.span)
         return Occurrence(space, name.text, span, owner, node is not None, node, tuple(further))
 
@@ -118,7 +118,7 @@ class _Walk:
         self,
         node: tree.UnitDecl | tree.ConstDecl | tree.SetDecl | tree.EnumDecl | tree.TypeDecl | tree.RecordDecl,
     ) -> Iterator[Occurrence]:
-        """Yield those of types, and of values that are known when they are written."""
+        """Yield the names of type declarations, and of values that are fixed when they are written."""
         match node:
             case tree.UnitDecl(name):
                 yield self.name(Space.UNIT, name, node)
@@ -140,7 +140,7 @@ class _Walk:
                 yield from self.fields(fields)
 
     def fields(self, fields: Iterable[tree.FieldDecl]) -> Iterator[Occurrence]:
-        """Yield those of the fields of a record, or of a link."""
+        """Yield the names in the fields of a record, or of a link."""
         for part in fields:
             yield self.name(Space.FIELD, part.name, part)
             yield from self.type(part.type)
@@ -151,7 +151,7 @@ class _Walk:
     def protocol(
         self, node: tree.LinkDecl | tree.ServesDecl | tree.CommandsDecl | tree.AdoptDecl
     ) -> Iterator[Occurrence]:
-        """Yield those of what is said to neighbours."""
+        """Yield the names in declarations of the protocol with neighbours."""
         match node:
             case tree.LinkDecl():
                 yield self.name(Space.LINK, node.name, node)
@@ -173,7 +173,7 @@ class _Walk:
                 yield from self.exprs((place, value))
 
     def procedure(self, node: tree.ProcedureDecl) -> Iterator[Occurrence]:
-        """Yield those of a procedure, its locals as its own."""
+        """Yield the names of a procedure, its locals as its own."""
         yield self.name(Space.CALL, node.name, node)
         self.owner = node.name.text
         self.locals = frozenset((*(each.name.text for each in node.params), *_locals(node.body)))
@@ -184,7 +184,7 @@ class _Walk:
         yield from self.body(node.body)
 
     def level(self, node: tree.LevelDecl) -> Iterator[Occurrence]:
-        """Yield those of a level."""
+        """Yield the names of a level."""
         yield self.name(Space.TABLE, node.name, node)
         yield from self.exprs((node.period,))
         yield from (self.name(Space.CALL, name) for name in (*node.preprocess, *node.postprocess))
@@ -199,7 +199,7 @@ class _Walk:
     # --- tables ---
 
     def table(self, node: tree.TableDecl) -> Iterator[Occurrence]:
-        """Yield those of a table: its headings, its lines, their cells."""
+        """Yield the names of a table: its headings, its lines, their cells."""
         yield self.name(Space.TABLE, node.name, node)
         yield from (self.name(Space.CLAIM, name) for name in node.assuming)
         for heading in (*node.conditions, *node.actions):
@@ -208,7 +208,7 @@ class _Walk:
             yield from self.row(node, row)
 
     def row(self, table: tree.TableDecl, row: tree.Row) -> Iterator[Occurrence]:
-        """Yield those of a line."""
+        """Yield the names of a line."""
         owner = table.name.text
         yield Occurrence(Space.LINE, row.name, row.cells[0].span, owner, True, row)
         yield from (self.name(Space.LINE, name, None, owner) for name in (*row.above, *row.same))
@@ -224,13 +224,13 @@ class _Walk:
                 yield from self.inside(cell, self.body(action, orders=heading.word != "procedures"))
 
     def inside(self, cell: Cell, found: Iterator[Occurrence]) -> Iterator[Occurrence]:
-        """Yield what is found in a cell, at its place in the file."""
+        """Yield names found in a cell, at their place in the file."""
         self.cell = cell
         yield from found
         self.cell = None
 
     def condition(self, test: tree.Condition) -> Iterator[Occurrence]:
-        """Yield those of a cell of conditions."""
+        """Yield the names of a cell of conditions."""
         match test:
             case tree.Comparison(_, value):
                 yield from self.joined(value, list(test.places))
@@ -243,7 +243,7 @@ class _Walk:
                 yield from self.expr(time)
 
     def joined(self, value: tree.Expr, places: list[tuple[int, int]]) -> Iterator[Occurrence]:
-        """Yield those of conditions joined by `and`: each was parsed by itself where there are places."""
+        """Yield the names of conditions joined by `and`: each was parsed by itself where there are places."""
         if len(places) < 2 or not isinstance(value, tree.Binary):
             self.shift = places[0][0] if places else 0
             yield from self.expr(value)
@@ -255,7 +255,7 @@ class _Walk:
     # --- statements ---
 
     def body(self, body: Sequence[tree.Statement], *, orders: bool = False) -> Iterator[Occurrence]:
-        """Yield those of statements; where they are orders, what looks like a call is a command."""
+        """Yield the names of statements; in orders, an apparent call is a command."""
         for statement in body:
             match statement:
                 case tree.Assign(place, value):
@@ -284,13 +284,13 @@ class _Walk:
     # --- expressions and types ---
 
     def exprs(self, exprs: Iterable[tree.Expr | None]) -> Iterator[Occurrence]:
-        """Yield those of several expressions."""
+        """Yield the names of several expressions."""
         for expr in exprs:
             if expr is not None:
                 yield from self.expr(expr)
 
     def members(self, members: Iterable[tree.Member]) -> Iterator[Occurrence]:
-        """Yield those of the members of a set."""
+        """Yield the names of the members of a set."""
         for member in members:
             match member:
                 case tree.Range(low, high):
@@ -301,7 +301,7 @@ class _Walk:
                     yield from self.expr(member)
 
     def expr(self, expr: tree.Expr) -> Iterator[Occurrence]:
-        """Yield those of an expression."""
+        """Yield the names of an expression."""
         match expr:
             case tree.Reference(name):
                 own = name.text in self.locals
@@ -323,12 +323,12 @@ class _Walk:
                 yield from self.exprs(_operands(expr))
 
     def unit(self, unit: tree.Unit | None) -> Iterator[Occurrence]:
-        """Yield those of a unit."""
+        """Yield the names of a unit."""
         if unit is not None:
             yield from (self.name(Space.UNIT, factor.name) for factor in unit.factors)
 
     def type(self, kind: tree.TypeExpr) -> Iterator[Occurrence]:
-        """Yield those of a type."""
+        """Yield the names of a type."""
         match kind:
             case tree.NamedType(name):
                 yield self.name(Space.TYPE, name)
@@ -347,7 +347,7 @@ class _Walk:
 
 
 def _operands(expr: tree.Expr) -> tuple[tree.Expr | None, ...]:
-    """The expressions that another is made of, where it has no names of its own."""
+    """Return the operands of an expression that has no names of its own."""
     match expr:
         case tree.IndexOf(first, second) | tree.Binary(_, first, second) | tree.Lasts(first, second):
             return first, second

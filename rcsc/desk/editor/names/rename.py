@@ -21,12 +21,12 @@ _EMPTY_ROW = re.compile(r"^[ \t]*\|[ \t|]*(?:\r?\n|$)", re.MULTILINE)
 
 
 class RefusedError(Exception):
-    """Why a name is not renamed, in words."""
+    """The reason why a name is not renamed, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Renamed:
-    """What renaming does.
+    """The result of renaming.
 
     Attributes:
         texts: The new text of each file that changes.
@@ -38,7 +38,7 @@ class Renamed:
 
 
 def renamable(names: Names, name: Occurrence) -> Occurrence:
-    """The one declaration of a name.
+    """Find the one declaration of a name.
 
     Raises:
         RefusedError: It has none in these files, or several.
@@ -95,7 +95,7 @@ def renamed(
 
 
 def _clashes(other: Occurrence, declared: Occurrence) -> bool:
-    """Whether another name could be taken for the new one: lines only in their table."""
+    """Tell whether another name could be taken for the new one: lines only in their table."""
     if declared.space is Space.LINE or other.space is Space.LINE:
         return (
             other.space is declared.space

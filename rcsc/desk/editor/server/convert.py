@@ -31,7 +31,7 @@ NO_VERSION = -1
 
 
 def reads_messages() -> Any:
-    """What makes values of messages: as pygls does, but that a document may come without a version."""
+    """Return a converter of messages, as pygls makes it, except that a document may come without a version."""
     made: Any = default_converter()  # type: ignore[no-untyped-call]  # of pygls
     for kind in (types.TextDocumentItem, types.VersionedTextDocumentIdentifier):
         made.register_structure_hook(kind, partial(_versioned, made.get_structure_hook(kind)))
@@ -43,7 +43,7 @@ def _versioned(make: Callable[[Any, Any], Any], value: Mapping[str, object], kin
 
 
 def path_of(uri: str, folder: str = "/") -> str:
-    """The path of a document; of one that is in no file a path in `folder` that none has."""
+    """Return the path of a document; for one that is in no file, a path in `folder` that no file has."""
     path = uris.to_fs_path(uri) if uri.startswith("file:") else None
     if path is None:
         scheme, _, name = uri.partition(":")
@@ -65,37 +65,37 @@ class Converter:
     uris: Mapping[str, str] = field(default_factory=dict)
 
     def uri(self, path: str) -> str:
-        """What a client calls a file."""
+        """Return a client's name for a file."""
         return self.uris.get(path) or uris.from_fs_path(path) or path
 
     def position(self, file: str, place: Place) -> types.Position:
-        """A place."""
+        """Convert a place."""
         lines = self.lines.get(file)
         shifted = place if lines is None else lines.shifted(place, self.units)
         return types.Position(shifted.line, shifted.column)
 
     def range(self, area: Area) -> types.Range:
-        """An area."""
+        """Convert an area."""
         return types.Range(self.position(area.file, area.start), self.position(area.file, area.end))
 
     def between(self, file: str, start: int, end: int) -> types.Range:
-        """The area between two offsets."""
+        """Return the area between two offsets."""
         lines = self.lines[file]
         first, last = lines.place(start, self.units), lines.place(end, self.units)
         return types.Range(types.Position(first.line, first.column), types.Position(last.line, last.column))
 
     def offset(self, file: str, position: types.Position) -> int:
-        """The offset of a client's position."""
+        """Return the offset of a client's position."""
         return self.lines[file].offset(Place(position.line, position.character), self.units)
 
     def location(self, area: Area) -> types.Location:
-        """An area with its file."""
+        """Convert an area with its file."""
         return types.Location(self.uri(area.file), self.range(area))
 
     # --- findings ---
 
     def diagnostic(self, finding: Finding) -> types.Diagnostic:
-        """A finding; its witnesses stand in the message, for people, and in `data`."""
+        """Convert a finding; its witnesses stand in the message, for people, and in `data`."""
         lines = [(line.area, f"line {line.name}") for each in finding.witnesses[:3] for line in each.lines]
         related = [(area, text) for area, text in (*finding.related, *lines) if area is not None]
         return types.Diagnostic(
@@ -119,19 +119,19 @@ class Converter:
         )
 
     def edits(self, edits: Iterable[Edit]) -> types.WorkspaceEdit:
-        """Edits of several files."""
+        """Convert edits of several files."""
         by_file: dict[str, list[types.TextEdit]] = {}
         for edit in edits:
             by_file.setdefault(self.uri(edit.area.file), []).append(self.edit(edit))
         return types.WorkspaceEdit(changes={uri: list(each) for uri, each in by_file.items()})
 
     def edit(self, edit: Edit) -> types.TextEdit:
-        """One edit."""
+        """Convert one edit."""
         return types.TextEdit(self.range(edit.area), edit.text)
 
 
 def message(finding: Finding) -> str:
-    """What is shown of a finding: the least input, the region, notes and helps."""
+    """Write the message of a finding: the least input, the region, notes and helps."""
     lines = [finding.message]
     for each in finding.witnesses[:1]:
         lines.append("input: " + ", ".join(f"{name} = {value}" for name, value in each.values))

@@ -63,7 +63,7 @@ class Failed(JsonRpcException):
 
 
 def register(server: LanguageServer, session: Session) -> None:
-    """Have the server answer these requests."""
+    """Register the answers to these requests with the server."""
     _names(server, session)
     _writing(server, session)
     _layout(server, session)
@@ -113,7 +113,7 @@ def _names(server: LanguageServer, session: Session) -> None:
 def _here(
     session: Session, document: types.TextDocumentIdentifier, position: types.Position
 ) -> tuple[Names, Converter, str, int]:
-    """The names of a file, its text by lines, its path, and the offset of a position."""
+    """Return the names of a file, its text by lines, its path, and the offset of a position."""
     path = session.path(document.uri)
     names = session.names(path)
     converter = session.converter({file: source.text for file, source in names.sources.items()})
@@ -134,7 +134,7 @@ def _hover(session: Session, params: types.HoverParams) -> types.Hover | None:
 
 
 def _known_grids(session: Session, names: Names, path: str) -> Mapping[str, Grid]:
-    """The tables of a file: as they were last answered, if that is of the text as it is; else being proved."""
+    """Return the tables of a file: those of the last answer, if it matches the present text; else marked as being proved."""
     answer = session.workspace.answered(path)
     if answer is not None:
         return {grid.name: grid for grid in answer.tables}
@@ -166,7 +166,7 @@ def _location(converter: Converter, span: Span) -> types.Location:
 
 
 def _project(session: Session, path: str, name: Occurrence) -> Names:
-    """The names of all files of the project that are in a program with the declaration of a name; all where it is not found.
+    """Return the names of all project files that are in a program with the declaration of a name; of all files if it is not found.
 
     A program is one scope: what a file declares is seen in every file that one which uses it uses, too.
     """
@@ -243,7 +243,7 @@ def _edits(source: Source, text: str) -> Sequence[Edit]:
 
 
 def _wrong_with(session: Session, path: str, names: Names, name: Occurrence, texts: Mapping[str, str]) -> str:
-    """What is wrong with the programs of a project in these texts, of those that are in order as it is; empty for nothing."""
+    """Return the first error that these texts bring into a program of the project that is in order without them; empty for none."""
     files = session.workspace.project(path)
     before, after = session.workspace.read_all(files), session.workspace.read_all(files, texts)
     for file, source in names.sources.items():
@@ -262,7 +262,7 @@ def _wrong_with(session: Session, path: str, names: Names, name: Occurrence, tex
 
 
 def _elsewhere(path: str, name: Occurrence) -> str:
-    """A warning where files that are no tables have the word, too: descriptions, scripts and plants are not changed."""
+    """Return a warning where files other than tables have the word, too: descriptions, scripts and plants are not changed."""
     root = os.path.dirname(path)
     found = [
         each
@@ -289,7 +289,7 @@ def _symbols(session: Session, path: str) -> list[types.DocumentSymbol]:
 
 
 def _declared(converter: Converter, source: Source) -> Iterator[types.DocumentSymbol]:
-    """Yield what a text declares, whether it parses or not."""
+    """Yield the declarations of a text, whether it parses or not."""
     for word, name, whole, named in declarations(source):
         children = []
         table = table_of(source.text[: whole.end], name) if word == "table" else None
@@ -314,7 +314,7 @@ def _declared(converter: Converter, source: Source) -> Iterator[types.DocumentSy
 
 
 def _everywhere(session: Session, query: str) -> list[types.WorkspaceSymbol]:
-    """Symbols of the projects that are open whose names hold the letters of the query in order."""
+    """Return symbols of the open projects whose names hold the letters of the query in order."""
     files = {file for path in session.uris for file in session.workspace.project(path)}
     found = []
     for file in sorted(files):
@@ -421,7 +421,7 @@ def _layout(server: LanguageServer, session: Session) -> None:
 def _formatting(
     session: Session, document: types.TextDocumentIdentifier, within: types.Range | None = None
 ) -> list[types.TextEdit]:
-    """The edits that lay a text out as `rcsc fmt` does; none where it does not parse.
+    """Return the edits that lay a text out as `rcsc fmt` does; none where it does not parse.
 
     Lines that stay are left alone, so that the cursor stays, too.
     """
@@ -455,7 +455,7 @@ def _on_type(session: Session, params: types.DocumentOnTypeFormattingParams) -> 
 
 
 def _key(server: LanguageServer, session: Session, command: str, act: "keys.Act") -> None:
-    """Register a command that changes a table around a place: the edits, and where the cursor is then; null outside tables."""
+    """Register a command that changes a table around a place; it answers with edits and the new cursor, or null outside tables."""
 
     @server.command(command)
     @current

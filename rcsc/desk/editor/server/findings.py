@@ -27,19 +27,19 @@ class CancelledError(JsonRpcException):
 
 
 def register(server: LanguageServer, session: Session) -> None:
-    """Have the server answer these requests."""
+    """Register the answers to these requests with the server."""
     _pulled(server, session)
     _actions(server, session)
     _lenses(server, session)
 
 
 def converter_of(session: Session, answer: Answer) -> Converter:
-    """Places of all texts that an answer points into."""
+    """Return a converter of places in all texts that an answer points into."""
     return session.converter(answer.texts)
 
 
 def by_file(answer: Answer) -> dict[str, list[Finding]]:
-    """The findings of each file; of the file itself even where there are none."""
+    """Return the findings of each file; the file itself is there even without any."""
     found: dict[str, list[Finding]] = {answer.file: []}
     for finding in answer.findings:
         found.setdefault(finding.area.file, []).append(finding)
@@ -108,7 +108,7 @@ def _actions(server: LanguageServer, session: Session) -> None:
 def _quick(
     session: Session, converter: Converter, answer: Answer, within: types.Range
 ) -> list[types.CodeAction]:
-    """Repairs of the findings that touch a range."""
+    """Return the repairs of the findings that touch a range."""
     found: list[types.CodeAction] = []
     for finding in answer.findings:
         if len(found) >= MOST_ACTIONS:
@@ -130,7 +130,7 @@ def _quick(
 
 
 def _touches(converter: Converter, finding: Finding, within: types.Range) -> bool:
-    """Whether a finding, or a line that it is about, has a line of text in common with a range."""
+    """Tell whether a finding, or a line that it is about, has a line of text in common with a range."""
     areas = [finding.area, *(area for area, _ in finding.related)]
     areas += [line.area for each in finding.witnesses for line in each.lines if line.area is not None]
     places = [converter.range(area) for area in areas if area.file == finding.area.file]
@@ -196,7 +196,7 @@ def _witness(session: Session, path: str, table: str, which: int) -> Shown:
 
 
 def _of_table(converter: Converter, answer: Answer, grid: Grid, uri: str) -> list[types.CodeLens]:
-    """The lenses of a table: its standing, which proves it anew; its graph; its witness, if a finding has one."""
+    """Return the lenses of a table: its standing, which proves it anew; its graph; its witness, if a finding has one."""
     place = converter.range(grid.area)
     commands = [types.Command(str(grid.standing), "rcsc.prove", arguments=[uri, grid.name])]
     commands.append(types.Command("graph", "rcsc.graph", arguments=[uri, grid.name]))
@@ -206,7 +206,7 @@ def _of_table(converter: Converter, answer: Answer, grid: Grid, uri: str) -> lis
 
 
 def _shares(converter: Converter, answer: Answer, within: types.Range) -> "list[types.InlayHint]":
-    """The share of the inputs of each line, at the end of its first row."""
+    """Return the share of the inputs of each line, at the end of its first row."""
     found = []
     for grid in answer.tables:
         for row in grid.rows:
@@ -227,14 +227,14 @@ def _shares(converter: Converter, answer: Answer, within: types.Range) -> "list[
 
 
 def _show(server: LanguageServer, session: Session, shown: Shown) -> dict[str, object]:
-    """Give what a lens comes to, and show its text to who has asked for that."""
+    """Return the result of a lens, and show its text to a client that has asked for that."""
     if session.shows and shown.form == "text":
         server.window_show_message(types.ShowMessageParams(types.MessageType.Info, shown.text))
     return {"title": shown.title, "form": shown.form, "text": shown.text}
 
 
 def status_of(session: Session, answer: Answer) -> dict[str, object]:
-    """The standing of each table of a file, as lenses and hovers say it."""
+    """Return the standing of each table of a file, as lenses and hovers show it."""
     converter = converter_of(session, answer)
     return {
         "uri": converter.uri(answer.file),

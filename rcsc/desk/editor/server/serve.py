@@ -29,7 +29,7 @@ _WATCHED = "**/{*.rcs,rcsc.toml}"
 
 
 def at_rest() -> None:
-    """Do, while nobody types, what would keep a key waiting."""
+    """Do, while nobody types, the work that would keep a key waiting."""
     ready()
     settled()
 
@@ -53,7 +53,7 @@ class Server(LanguageServer):
         findings.register(self, self.session)
 
     async def told(self, answer: Answer) -> None:
-        """Send what is new: findings to who does not ask for them, the standings, and that lenses may differ."""
+        """Send what is new: findings to clients that do not ask for them, the standings, and that lenses may differ."""
         if self.session.is_told(answer):
             return
         if not self._pulls:
@@ -63,12 +63,12 @@ class Server(LanguageServer):
 
     @property
     def _pulls(self) -> bool:
-        """Whether the client asks for findings itself."""
+        """True if the client asks for findings itself."""
         document = self.client_capabilities.text_document
         return document is not None and document.diagnostic is not None
 
     def _push(self, answer: Answer) -> None:
-        """Send the findings of a file and of those that it uses; files that had some before and have none are told so."""
+        """Send the findings of a file and of those that it uses; clear those of files that have none any more."""
         converter = converter_of(self.session, answer)
         found = {
             file: each
@@ -95,11 +95,11 @@ class Server(LanguageServer):
                 self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, []))
 
     def _held(self) -> set[str]:
-        """Files whose findings stay: those that are open, and those of which another open file has told some."""
+        """Return the files whose findings stay: those that are open, and those in which another open file has some."""
         return self.session.uris.keys() | set[str]().union(*self._shown.values())
 
     def _refresh(self) -> None:
-        """Have the client ask again for what may differ, if it can."""
+        """Ask the client to ask again for answers that may differ, if it can."""
         workspace = self.client_capabilities.workspace
         if workspace is None:
             return
@@ -169,7 +169,7 @@ def _texts(server: Server) -> None:
 
 
 def serve(options: Options, stdin: BinaryIO, stdout: BinaryIO) -> None:
-    """Serve one client until it ends; what anything else prints goes to standard error."""
+    """Serve one client until it ends; other output goes to standard error."""
     with contextlib.redirect_stdout(sys.stderr):
         server = Server(options)
         try:

@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 def current(ask: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
-    """Tell the client that an answer is outdated, where it is."""
+    """Tell the client that an answer is outdated, if it is."""
 
     @wraps(ask)
     async def asked(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -44,7 +44,7 @@ def current(ask: Callable[P, Awaitable[T]]) -> Callable[P, Awaitable[T]]:
 
 
 async def _in(worker: ThreadPoolExecutor, ask: Callable[[], T]) -> T:
-    """Have a worker answer; whatever it raises is raised: of `StopIteration` a future hears nothing, and who waits would for ever."""
+    """Run a question in a worker, and raise what it raises; `StopIteration` becomes `RuntimeError`, as no future can carry it."""
 
     def asked() -> T:
         try:
@@ -95,11 +95,11 @@ class Session:
     # --- texts ---
 
     def path(self, uri: str) -> str:
-        """The path of a document."""
+        """Return the path of a document."""
         return path_of(uri, self.folders[0] if self.folders else os.getcwd())
 
     def open(self, uri: str, text: str, version: int) -> None:
-        """Take a text as it is now, and have it checked."""
+        """Take a text as it is now, and queue its check."""
         path = self.path(uri)
         self.uris[path] = uri
         self.versions.pop(path, None)
@@ -109,7 +109,7 @@ class Session:
         self.changed(path)
 
     def close(self, uri: str) -> None:
-        """Go back to what is on disk."""
+        """Return to the text on disk."""
         path = self.path(uri)
         self.uris.pop(path, None)
         self.versions.pop(path, None)
@@ -118,7 +118,7 @@ class Session:
         self.changed(path)
 
     def changed(self, path: str) -> None:
-        """Have what is open checked: this file is looked at at once, or when keys rest that come faster than they are looked at."""
+        """Queue a check of the open files; this file is looked at at once, or when keys rest that come faster than they are looked at."""
         self.turn += 1
         if self._waiting is not None:
             self._waiting.cancel()
@@ -147,7 +147,7 @@ class Session:
     # --- answers ---
 
     async def answer(self, path: str) -> Answer:
-        """The answer to a file as it is now, as far as it is known in a moment.
+        """Return the answer to a file as it is now, as far as it is found in a moment.
 
         Raises:
             OutdatedError: A text has changed meanwhile.
@@ -156,7 +156,7 @@ class Session:
         return await self._asked(lambda file, go_on: self.workspace.glance(file, go_on, since_s), path)
 
     async def final(self, path: str) -> Answer:
-        """The answer to a file as it is now, with all that it leaves open for a moment.
+        """Return the answer to a file as it is now, with everything that takes longer.
 
         Raises:
             OutdatedError: A text has changed meanwhile.
@@ -164,7 +164,7 @@ class Session:
         return await self._asked(self.workspace.check, path)
 
     async def _asked(self, ask: Callable[[str, Callable[[], bool]], Answer], path: str) -> Answer:
-        """Ask for an answer; a bug that comes in its way is one, so that whoever waits is told, and the next file is asked for."""
+        """Ask for an answer; a bug on the way becomes an answer, so that whoever waits hears of it, and the next file is asked for."""
         turn = self.turn
         try:
             return await self.proving(ask, path, lambda: self.turn == turn)
@@ -176,7 +176,7 @@ class Session:
             return self.workspace.given_up(path, error)
 
     async def proving(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask for something that may have to be proved; one after another.
+        """Run a question that may need a proof; one after another.
 
         Raises:
             OutdatedError: A text has changed meanwhile.
@@ -184,11 +184,11 @@ class Session:
         return await self._of_one_text(self._proves, lambda: ask(*args, **kwargs))
 
     async def reading(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask for something that needs no proof, and that no harm comes of where a text has changed meanwhile."""
+        """Run a question that needs no proof, and that does no harm where a text has changed meanwhile."""
         return await _in(self._reads, lambda: ask(*args, **kwargs))
 
     async def editing(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask for edits that need no proof.
+        """Run a question for edits that needs no proof.
 
         Raises:
             OutdatedError: A text has changed meanwhile: they are of another one.
@@ -203,30 +203,30 @@ class Session:
         return answer
 
     def is_told(self, answer: Answer) -> bool:
-        """Whether the client has this answer already, for this version; from now on it has."""
+        """Tell whether the client has this answer already, for this version, and note that it has it now."""
         new = (answer, self.versions.get(answer.file))
         before = self._told.get(answer.file)
         self._told[answer.file] = new
         return before is not None and before[0] is answer and before[1] == new[1]
 
     def result_of(self, answer: Answer) -> str:
-        """What an answer is called, so that a client need not be given the same again."""
+        """Return the name of an answer, so that a client need not be given the same again."""
         known = self._results.get(answer.file)
         if known is None or known[0] is not answer:
             self._results[answer.file] = known = (answer, 0 if known is None else known[1] + 1)
         return str(known[1])
 
     def converter(self, texts: Mapping[str, str]) -> Converter:
-        """Places of these texts in the client's units."""
+        """Return a converter of places in these texts to the client's units."""
         return Converter({path: Lines(text) for path, text in texts.items()}, self.units, self.uris)
 
     def names(self, path: str) -> Names:
-        """The names of a file and of all that it uses."""
+        """Return the names of a file and of all that it uses."""
         reading = self.workspace.reading(path)
         return Names(reading.files, reading.sources, reading.nearest)
 
     def stop(self) -> None:
-        """Give up what is being proved, as soon as it can be."""
+        """Stop the proof under way, as soon as possible."""
         self.turn += 1
         for worker in (self._proves, self._reads):
             worker.shutdown(wait=False, cancel_futures=True)

@@ -25,7 +25,7 @@ A_PIECE = 400
 
 @dataclass(slots=True)
 class Gaps:
-    """What nobody has set.
+    """The numbers that nobody has set.
 
     Attributes:
         ticks: At which something else was unset than at the tick before, in order; `names` what was.
@@ -36,7 +36,7 @@ class Gaps:
     _stood: list[Unsets] = field(default_factory=list)
 
     def begin(self, system: System) -> None:
-        """Begin a run, or go on with levels of other tables."""
+        """Begin a run, or continue with levels of other tables."""
         if self._stood:
             since = self._stood[-1].copy()
             since.adopt(map(_seen, system.levels))
@@ -58,7 +58,7 @@ class Gaps:
             self._keep(system, since)
 
     def back_to(self, tick: int) -> None:
-        """Forget what came after a tick."""
+        """Forget the gaps after a tick."""
         keep = max(1, bisect_right(self.ticks, tick))
         del self.ticks[keep:], self.names[keep:], self._stood[keep:]
 
@@ -71,7 +71,7 @@ class Gaps:
                 yield tick, last
 
     def within(self, level: str, name: str, last: int) -> list[list[int]]:
-        """Return from which tick to which, at most to `last`, nobody has set a variable."""
+        """Return the spans of ticks, at most to `last`, in which nobody has set a variable."""
         found: list[list[int]] = []
         for tick, unset in self.spans(level, name):
             if unset and tick <= last:
@@ -85,7 +85,7 @@ class Gaps:
         self.note(system.tick, since.now, {level.name: level.sign for level in system.levels})
 
     def note(self, tick: int, now: Mapping[str, frozenset[int]], signs: Mapping[str, Signature]) -> None:
-        """Note what is unset from a tick on, by its places."""
+        """Note the unset places from a tick on."""
         self.ticks.append(tick)
         self.names.append(
             {name: frozenset(signs[name].leaves[at].name for at in places) for name, places in now.items()}
@@ -93,7 +93,7 @@ class Gaps:
 
 
 def gaps_of(log: Log) -> Iterator[Gaps | None]:
-    """Yield nothing after each piece of a log, and at last what nobody has set in it.
+    """Yield None after each piece of a log, and at last its gaps.
 
     Args:
         log: Whole, or a part.

@@ -35,14 +35,14 @@ class History:
     gaps: Gaps | None = None
 
     def begin(self, system: System) -> None:
-        """Go on with levels as they are now, at first or after other tables were taken."""
+        """Continue with levels as they are now, at first or after other tables were taken."""
         levels = tuple(_begun(level, system.tick) for level in system.levels)
         self.gaps = self.gaps or Gaps()
         self.gaps.begin(system)
         self.logs.append(Log(system_facts(system.description), {}, levels, {}, ChainCheck()))
 
     def add(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
-        """Keep a tick; what `System.watch` calls."""
+        """Keep a tick; called by `System.watch`."""
         log = self._fitting(system)
         assert self.gaps is not None  # a log was begun
         self.gaps.add(system, ran)
@@ -76,7 +76,7 @@ class History:
         self.logs[-1] = replace(log, levels=tuple(levels))
 
     def find_gaps(self) -> Iterator[None]:
-        """Find what nobody had set in a log that was opened, and yield after each piece of it; a live run has it."""
+        """Find the gaps in an opened log, and yield after each piece of it; a live run has them."""
         for found in () if self.gaps is not None else gaps_of(self.logs[0]):
             if found is None:
                 yield
@@ -87,11 +87,11 @@ class History:
         return next((log for log in reversed(self.logs) if log.first < tick), self.logs[0])
 
     def stood_at(self, tick: int) -> Log:
-        """Return the log that has the values as a tick left them."""
+        """Return the log that has the values left by a tick."""
         return next((log for log in reversed(self.logs) if log.first <= tick), self.logs[0])
 
     def values(self, name: str, tick: int) -> Values:
-        """Return a level's leaves and trace as of a tick, with what was set by hand after it.
+        """Return a level's leaves and trace after a tick, with values set by hand after it.
 
         Raises:
             KeyError: There is no such level.
@@ -103,7 +103,7 @@ class History:
 
     @property
     def first(self) -> int:
-        """The first tick that is kept: that before the first cycle."""
+        """The first kept tick: that before the first cycle."""
         return self.logs[0].first
 
     @property
@@ -133,7 +133,7 @@ class History:
         return self.logs[-1]
 
     def _forget(self, log: Log) -> None:
-        """Let the older half go."""
+        """Drop the older half."""
         self.logs[:] = [log]
         self.era += 1
         for level in log.levels:
@@ -150,7 +150,7 @@ def _begun(level: RunningLevel, tick: int) -> LoggedLevel:
 
 
 def _settled(logged: LoggedLevel, level: RunningLevel, tick: int) -> LoggedLevel:
-    """Return a level with what was set by hand since its last cycle, and nothing that was taken back."""
+    """Return a level with the values set by hand since its last cycle, and without those taken back."""
     earlier = tuple(one for one in logged.restarts if one.tick <= tick)
     leaves = level.values[: len(level.sign.leaves)]
     record = logged.track.layout.unpack(logged.track.packed[-1])[: len(leaves)]

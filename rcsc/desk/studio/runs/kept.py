@@ -19,7 +19,7 @@ MOST_CHARACTERS = 2_000
 
 @dataclass(frozen=True, slots=True)
 class KeptFinding:
-    """What a run breaks.
+    """A finding about a run: the obligation or property that it breaks.
 
     Attributes:
         level: Whose obligation it is; empty where it is the whole system's.
@@ -36,7 +36,7 @@ class KeptFinding:
     wrong: tuple[tuple[int, str, str], ...] = ()
 
     def shown(self) -> Json:
-        """As pages have it."""
+        """Return the finding in the form for pages."""
         wrong = [{"tick": tick, "level": level, "text": told} for tick, level, told in self.wrong]
         return {
             "level": self.level, "table": self.table, "text": self.text[:MOST_CHARACTERS], "tick": self.tick, "wrong": wrong,
@@ -44,13 +44,13 @@ class KeptFinding:
 
 
 def finding_in(path: Path, log: Log) -> KeptFinding | None:
-    """What a log that was read breaks; None where it is not kept for that, or its finding is of no tick of it."""
+    """Return the finding for which a log is kept; None for none, or where it is of no tick of the log."""
     found = _proved(log.finding) if log.finding is not None else _beside(path)
     return found if found is not None and log.first <= found.tick <= log.last else None
 
 
 def glance(path: Path) -> str:
-    """What a log says that it breaks, from its beginning alone; empty where it says nothing."""
+    """Return the text of a log's finding, from its beginning alone; empty where it has none."""
     try:
         proved = finding_at_the_head(path)
     except UnreadableLog:
@@ -65,7 +65,7 @@ def _proved(finding: LoggedFinding) -> KeptFinding:
 
 
 def _beside(path: Path) -> KeptFinding | None:
-    """The finding of a campaign; None where there is none, or no file that a campaign wrote."""
+    """Return the finding of a campaign; None where there is none, or no file that a campaign wrote."""
     if path.name != LOG:
         return None
     try:

@@ -25,7 +25,7 @@ Changes = dict[str, list[list[Any]]]
 
 @dataclass(slots=True)
 class Lines:
-    """Which line each state of a level means, found once a state.
+    """The line that each state of a level stands for, found once a state.
 
     Attributes:
         known: By signature and state; the signature is kept, so that its number stays its own.
@@ -34,7 +34,7 @@ class Lines:
     known: dict[tuple[int, bytes], tuple[Signature, Stand]] = field(default_factory=dict)
 
     def of(self, logged: LoggedLevel, content: bytes) -> Stand:
-        """Table, line and fault of a record."""
+        """Return table, line and fault of a record."""
         key = id(logged.sign), content
         if key not in self.known:
             if len(self.known) > MOST_KNOWN:
@@ -43,7 +43,7 @@ class Lines:
         return self.known[key][1]
 
     def changes(self, history: History, since: int) -> tuple[Changes, int]:
-        """By level each tick after one with what it ran from then on, and up to which tick that is known.
+        """Return, by level, each tick after one with the line that ran from then on, and the tick up to which that is known.
 
         Args:
             history: Of the run.
@@ -61,7 +61,7 @@ class Lines:
         return {name: [one for one in changes if one[0] <= to] for name, changes in levels.items()}, to
 
     def within(self, history: History, first: int, last: int) -> Changes:
-        """By level what stands at a tick, and every change after it up to another."""
+        """Return, by level, the line at a tick, and every change after it up to another."""
         levels: Changes = {}
         for logged in history.ran_at(first).levels:
             place = logged.track.place(first)
@@ -73,7 +73,7 @@ class Lines:
         return levels
 
     def _add(self, logged: LoggedLevel, since: int, to: int, changes: list[list[Any]]) -> None:
-        """Append what a level began to run after a tick; the first record is what it began with, and no cycle."""
+        """Append each change of a level's line after a tick; the first record is its initial state, and no cycle."""
         track = logged.track
         place = track.place(since)
         last = changes[-1][1:] if changes else None

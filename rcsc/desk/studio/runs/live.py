@@ -142,13 +142,13 @@ class Live(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "run.type": self._type, "run.go": self._go, "run.pause": self._pause, "run.rate": self._set_rate, "run.words": self._words,
         }  # fmt: skip
 
     def greeting(self) -> Json:
-        """The state, and whose it is."""
+        """Return the state, and tell the page the script's rows and the orders."""
         self._rows = None
         self._later(self._tell_rows, 0.0)
         if self.commands is not None:
@@ -160,7 +160,7 @@ class Live(Concern):
         self._going = None
 
     def open(self) -> None:
-        """Open the system anew; what ran is gone."""
+        """Open the system anew; the run before is gone."""
         self._drop("the system is opened anew")
         self.commands, self.history, self.marks = None, History(), []
         try:
@@ -185,19 +185,19 @@ class Live(Concern):
             self._begin(RunOrder(-1), lambda _: None)
 
     def close_because(self, *why: str) -> None:
-        """Have nothing open, and say why."""
+        """Close the system, and give the reason."""
         self._drop("the system is closed")
         self.commands, self.why = None, "; ".join(filter(None, why))
         self.changed()
 
     def _drop(self, why: str) -> None:
-        """End a run whose system goes away; who asked for it is told."""
+        """End a run whose system goes away, and report that to whoever asked for it."""
         going, self._going, self._ended = self._going, None, ""
         if going is not None:
             going.done(lambda: _shown([], Refused(Code.STUDIO, why)))
 
     def held(self, seconds: float) -> None:
-        """Tell every page that one thing takes long, and how long; 0 once it is over. Not called in the lane, which is held."""
+        """Tell every page how long one thing takes; 0 once it is over. Not called in the lane, which is held."""
         what = (
             f"cycle {self.cycle} does not come to its end"
             if self.cycle
@@ -210,7 +210,7 @@ class Live(Concern):
     # --- what pages see ---
 
     def state(self) -> Json:
-        """Where the run is."""
+        """Return the state of the run."""
         title = self.opening.script or self.opening.path.resolve().parent.name
         if self.commands is None:
             return {"title": title, "open": False, "why": self.why, "text": f"no system runs: {self.why}"}
@@ -244,13 +244,13 @@ class Live(Concern):
         return f"{'runs' if self._going else 'paused'} at cycle {system.tick}, {seconds:.2f} s"
 
     def changed(self) -> None:
-        """Tell every page where the run is."""
+        """Tell every page the state of the run."""
         self._told_s = time.monotonic()
         self._tell("run.state", self.state())
         self._tell_rows()
 
     def _tell_rows(self) -> None:
-        """Tell what became of the script's rows, where that is news."""
+        """Tell the results of the script's rows, if they have changed."""
         operator = None if self.commands is None else operator_of(self.commands.session.system)
         key = (
             None
@@ -262,7 +262,7 @@ class Live(Concern):
             self._tell("run.rows", None if operator is None else _rows(operator))
 
     def _orders(self) -> Json:
-        """Every level that is ordered from outside, with the fields of an order."""
+        """Return every level that is ordered from outside, with the fields of an order."""
         session = self.session()
         levels = served(session.system.description, {level.name: level.sign for level in session.levels})
         return [
@@ -274,7 +274,7 @@ class Live(Concern):
         ]
 
     def session(self) -> Session:
-        """The session.
+        """Return the session.
 
         Raises:
             Refused: Nothing is open.
@@ -289,7 +289,7 @@ class Live(Concern):
     # --- what pages do ---
 
     def _type(self, ask: Ask) -> Json:
-        """Do a line as the shell does it; one that runs cycles is answered when they are done."""
+        """Run a line as the shell does; one that runs cycles is answered when they are done."""
         line = ask.body.text("line")
         if len(line) > LONGEST_LINE:
             raise Refused(Code.STUDIO, f"a command of more than {LONGEST_LINE} characters")
@@ -329,7 +329,7 @@ class Live(Concern):
         return {"shown": shown}
 
     def _go(self, ask: Ask) -> Json:
-        """Run until a breakpoint, a pause or the end of the script; answered at once."""
+        """Run until a breakpoint, a pause or the end of the script; answer at once."""
         self._open_commands()
         ask.check()
         return self._begin(RunOrder(-1), lambda _: None) and self.state()
@@ -355,7 +355,7 @@ class Live(Concern):
         return self.state()
 
     def _set_rate(self, ask: Ask) -> Json:
-        """Run so many times as fast as the clock; `null` as fast as it goes."""
+        """Set the rate: times as fast as the clock; `null` as fast as it goes."""
         rate = ask.body.number("rate", None)
         if rate is not None and not 0.01 <= rate <= FASTEST:
             raise Refused(Code.STUDIO, f"a rate is 0.01 to {FASTEST:g} times that of the clock")
@@ -366,7 +366,7 @@ class Live(Concern):
         return self.state()
 
     def _words(self, ask: Ask) -> Json:
-        """Words that may be typed which have a part in them."""
+        """Return the possible words that contain a given part."""
         part = ask.body.text("part").casefold()
         with PROVER:
             every = dict.fromkeys(self._open_commands().completions())
@@ -388,7 +388,7 @@ class Live(Concern):
         self._later(lambda: self._slice(going), PAUSE_S)
 
     def _early(self, system: System, going: Going) -> bool:
-        """Whether the clock has not come so far."""
+        """Tell whether the run is ahead of the clock."""
         if self._rate is None:
             return False
         due_s = going.done_ticks * system.description.tick_ms / 1000 / self._rate
@@ -425,7 +425,7 @@ class Live(Concern):
             self.cycle = 0
 
     def _end(self, why: str, *, hand: bool = False, refused: Refused | None = None) -> None:
-        """End the run under way, and say why."""
+        """End the run under way, and give the reason."""
         going, self._going, self._ended = self._going, None, why
         assert going is not None
         system = self.session().system
@@ -478,13 +478,13 @@ def _field(to: Served, at: int) -> dict[str, Any]:
 
 
 def range_of(leaf: Leaf) -> str:
-    """The declared range in words, for a number of JavaScript cannot hold every bound; empty where it has none to tell."""
+    """Return the declared range in words, for a number of JavaScript cannot hold every bound; empty where there is none to show."""
     told = leaf.low is not None and not leaf.members and leaf.c_type != "bool"
     return f"{leaf.low} .. {leaf.high}" if told else ""
 
 
 def operator_of(system: System) -> Operator | None:
-    """Return who gives the orders of a script; `undo` puts another in its place."""
+    """Return the operator that gives the orders of a script; `undo` puts another in its place."""
     for part in system.outside:
         if isinstance(part, Together):
             return part.operator
@@ -507,7 +507,7 @@ def _rows(operator: Operator) -> Json:
 
 
 def ended(system: System) -> str:
-    """Say that what stands outside is at its end; empty where it is not."""
+    """Return the reason why the run has ended outside the levels; empty where it has not."""
     operator = operator_of(system)
     if operator is not None and operator.over and operator.at_rest:
         stopped = operator.stopped

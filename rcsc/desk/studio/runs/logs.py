@@ -39,7 +39,7 @@ class Logs(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"log.list": self._list, "log.open": self._open}
 
     def begin(self) -> None:
@@ -48,7 +48,7 @@ class Logs(Concern):
             self._open_at(self._called(path), path)
 
     def _list(self, ask: Ask) -> Json:
-        """The latest logs, each with what it breaks."""
+        """Return the latest logs, each with its finding."""
         found = []
         for name, path in self._found().items():
             with contextlib.suppress(OSError):  # it went meanwhile
@@ -82,7 +82,7 @@ class Logs(Concern):
         self._show(name, log, finding_in(path, log))
 
     def _found(self) -> dict[str, Path]:
-        """Every log by how it is called: its path in the first of the folders that has it, or as the user gave it."""
+        """Return every log by its name: its path in the first of the folders that has it, or as the user gave it."""
         found: dict[str, Path] = {}
         for path in self._given:
             found[self._called(path)] = path
@@ -101,7 +101,7 @@ def _read(path: Path) -> Log:
     """Read a log.
 
     Raises:
-        Refused: It is none.
+        Refused: The file is no log.
     """
     try:
         return read(path)

@@ -22,7 +22,7 @@ def moment(history: History, tick: int) -> dict[str, Any]:
 
 @dataclass(slots=True)
 class Shown:
-    """Moments of a run; a cycle that comes again, from the same state to the same, is worked out once.
+    """Moments of a run; a cycle that comes again, from the same state to the same, is computed once.
 
     Attributes:
         known: By log, level, and the states before and after the cycle; the log is kept, so that its number stays its own.
@@ -67,7 +67,7 @@ def _said(box: LevelTick, logged: LoggedLevel, tick: int) -> dict[str, Any]:
 
 
 def _named(sign: Signature, values: Values) -> dict[str, str]:
-    """The member that each state variable of an enumeration has after the cycle, for who draws states."""
+    """Return the member that each state variable of an enumeration has after the cycle, for drawings of states."""
     return {
         leaf.name: leaf.members[int(value)]
         for leaf, value in zip(sign.leaves, values, strict=False)  # values go on with the trace
@@ -76,7 +76,7 @@ def _named(sign: Signature, values: Values) -> dict[str, str]:
 
 
 def _plain(part: Any) -> Any:
-    """The same as plain values, with what two numbers of a report say of each other."""
+    """Return the same as plain values, with the comparison of a report's two numbers."""
     if isinstance(part, tuple):
         return [_plain(one) for one in part]
     if not is_dataclass(part):

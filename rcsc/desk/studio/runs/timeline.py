@@ -60,18 +60,18 @@ class TimeLine(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "time.tracks": self._tracks, "time.moment": self._moment, "time.values": self._values, "time.why": self._why,
             "time.find": self._find, "time.live": self._to_live,
         }  # fmt: skip
 
     def greeting(self) -> Json:
-        """Which run it is."""
+        """Return the run that everybody looks at."""
         return self.state()
 
     def close(self) -> None:
-        """Let the log go."""
+        """Close the log."""
         self._log = None
 
     @property
@@ -80,7 +80,7 @@ class TimeLine(Concern):
         return self._log or Source("", self.live.history)
 
     def state(self) -> Json:
-        """Which run it is, and of a log from where to where."""
+        """Return the run that everybody looks at, with the range of ticks for a log."""
         if self._log is None:
             return {"source": "live"}
         log = self._log.log
@@ -99,14 +99,14 @@ class TimeLine(Concern):
         }
 
     def _other(self, log: Log) -> str:
-        """Of which system a log is; empty where it is the studio's, or nobody knows what that is called."""
+        """Return the name of a log's system; empty where it is the studio's, or the studio's name is not known."""
         with contextlib.suppress(BadDescription, OSError):
             name = log.facts["name"]
             return "" if name == description(self.live.opening.path).name else name
         return ""
 
     def show(self, name: str, log: Log, finding: KeptFinding | None = None) -> None:
-        """Have everybody look at a log, and at what it breaks."""
+        """Show everybody a log, and its finding."""
         self._log = Source(name, History([log]), log, finding)
         self._tell("time.state", self.state())
 
@@ -167,7 +167,7 @@ class TimeLine(Concern):
     # --- values ---
 
     def _values(self, ask: Ask) -> Json:
-        """Every variable of a level as a tick left it, and which the tick changed."""
+        """Return every variable of a level as a tick left it, and whether the tick changed it."""
         tick = self._tick(ask)
         history = self.history()
         logged = self._level(ask, tick)
@@ -188,7 +188,7 @@ class TimeLine(Concern):
     # --- questions about a cycle ---
 
     def _why(self, ask: Ask) -> Json:
-        """Each table that a level's cycle tried, and for each of its lines what did not hold."""
+        """Return each table that a level's cycle tried, and for each of its lines the conditions that did not hold."""
         tick = self._tick(ask)
         logged = self._level(ask, tick)
         at = logged.track.place(tick)
@@ -209,7 +209,7 @@ class TimeLine(Concern):
         return {"tick": logged.track.ticks[at], "tables": [asdict(table) for table in tables]}
 
     def _program(self, logged: LoggedLevel) -> Program:
-        """What the tables of a level mean that a run had.
+        """Return the program of a level, if it has the tables that the run had.
 
         Raises:
             Refused: The levels that run here have others.
@@ -228,7 +228,7 @@ class TimeLine(Concern):
         return session.program(level)
 
     def _find(self, ask: Ask) -> Json:
-        """The next tick, or the one before, in which a condition holds; null where there is none."""
+        """Find the next tick, or the one before, in which a condition holds; null where there is none."""
         text = ask.body.text("text")
         if len(text) > LONGEST:
             raise Refused(Code.STUDIO, f"a condition of more than {LONGEST} characters")

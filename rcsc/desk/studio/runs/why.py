@@ -30,7 +30,7 @@ Snapshot = Mapping[str, Value]
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A line on the values of a cycle.
+    """A line, judged on the values of a cycle.
 
     Attributes:
         matches: Whether every cell of it holds.
@@ -52,7 +52,7 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class TableJudged:
-    """A table in a cycle.
+    """A table, judged in a cycle.
 
     Attributes:
         failed: Assumptions of it that did not hold.
@@ -131,5 +131,5 @@ def _part_holds(part: Expr, now: Snapshot) -> bool:
 
 
 def _not_again(procedure: Procedure, _: list[Value]) -> tuple[Value, ...]:
-    """Refuse: an extern procedure is somebody's own program, and is not run again to look at a cycle."""
+    """Refuse the call: an extern procedure is a user's own program, and is not run again to look at a cycle."""
     raise ExternError(f"`{procedure.name}` is an extern procedure, and is not called again")

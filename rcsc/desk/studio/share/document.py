@@ -30,7 +30,7 @@ _BESIDE = re.compile(r"[^\w]")
 
 
 def bundled(parts: Sequence[tuple[str, str]]) -> str:
-    """Return one script of modules: each is a function of its own, so that none sees what another has for itself.
+    """Return one script of modules: each is a function of its own, so that none sees the private names of another.
 
     Args:
         parts: Path and text of each, in an order in which each takes from those before it alone.
@@ -42,7 +42,7 @@ def bundled(parts: Sequence[tuple[str, str]]) -> str:
 
 
 def _module(text: str) -> str:
-    """What a module does; it returns what it gives to others."""
+    """Return the body of a module's function, which returns its exports."""
     gives: dict[str, str] = {name: name for _, name in _NAMED.findall(_COMMENT.sub("", text))}
     gives |= {name: name for names, _ in _AGAIN.findall(text) for name, _ in _listed(names)}
     gives |= {given: name for names in _LISTED.findall(text) for name, given in _listed(names)}
@@ -53,14 +53,14 @@ def _module(text: str) -> str:
 
 
 def _taken(names: str) -> str:
-    """What an import takes, as a pattern."""
+    """Return the imported names as a pattern."""
     if not names.startswith("{"):
         return f"{{ default: {names} }}"
     return "{" + ", ".join(f"{name}: {here}" for name, here in _listed(names)) + "}"
 
 
 def _listed(names: str) -> Iterator[tuple[str, str]]:
-    """Each name of a list, and as what it goes on."""
+    """Yield each name of a list, and the name that it gets."""
     for each in names.strip("{} ").split(","):
         name, _, called = each.strip().partition(" as ")
         yield name, called or name
@@ -79,14 +79,14 @@ def player() -> str:
 
 @cache
 def style() -> str:
-    """Return how its parts look."""
+    """Return the style of its parts."""
     page = files("rcsc.desk.studio").joinpath("page")
     return "\n".join(page.joinpath(part).read_text(encoding="utf-8") for part in STYLES)
 
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """What a page has in it that shows a film: `played.html.jinja` of `rcsc.views.pages` says where.
+    """The parts of a page that show a film; `played.html.jinja` of `rcsc.views.pages` places them.
 
     Attributes:
         data: The film, packed.

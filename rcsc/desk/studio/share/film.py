@@ -27,7 +27,7 @@ Draw = Callable[[int], dict[str, Any]]
 
 
 def film(history: History, at: int, around: int, draw: Draw) -> Iterator[Film]:
-    """Yield what is there so far of a moment, after each tick and each picture; the last is whole.
+    """Yield the film of a moment as far as it is made, after each tick and each picture; the last is whole.
 
     Args:
         history: Of the run.
@@ -80,7 +80,7 @@ def _begun(history: History, at: int, first: int, last: int) -> Film:
 
 
 def _variables(history: History, last: int) -> dict[str, dict[str, Film]]:
-    """Every variable by level and name, before anything is told of its values."""
+    """Return every variable by level and name, before any of its values."""
     logs = [log for log in history.logs if log.first <= last]
     every: dict[str, dict[str, Film]] = {}
     for log in logs:
@@ -94,7 +94,7 @@ def _variables(history: History, last: int) -> dict[str, dict[str, Film]]:
 
 
 def _gathered(whole: Film, history: History) -> Iterator[None]:
-    """Tell of every tick what is other than in the tick before it."""
+    """Add the changes of every tick."""
     shown = Shown()
     boxes: dict[str, Film] = {}
     values: dict[str, tuple[object, ...]] = {}
@@ -122,7 +122,7 @@ def _told(variables: dict[str, Film], logged: LoggedLevel, tick: int, now: tuple
 
 
 def _gaps(whole: Film, history: History) -> Iterator[None]:
-    """Tell when nobody had set a number."""
+    """Add the spans in which nobody had set a number."""
     yield from history.find_gaps()
     assert history.gaps is not None
     for level, variables in whole["variables"].items():
@@ -131,7 +131,7 @@ def _gaps(whole: Film, history: History) -> Iterator[None]:
 
 
 def _pictured(whole: Film, at: int, draw: Draw) -> Iterator[None]:
-    """Draw the moment, and others at even distances, the nearest first; say why where it cannot be drawn."""
+    """Draw the moment, and others at even distances, the nearest first; give the reason where it cannot be drawn."""
     first, last = whole["first"], whole["last"]
     apart = max(1, -(-(last - first) // (MOST_PICTURES - 1)))
     ticks = sorted({at, *range(first, last + 1, apart)}, key=lambda tick: abs(tick - at))

@@ -35,7 +35,7 @@ class Moments(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"share.moment": self._moment}
 
     def _moment(self, ask: Ask) -> Json:
@@ -73,7 +73,7 @@ class Findings(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"handed.finding": self._finding}
 
     def _finding(self, ask: Ask) -> Json:

@@ -44,7 +44,7 @@ def arrow_drawn(
     graph: StateGraph,
     ends: tuple[str, str],
 ) -> Drawn:
-    """The text with a line from one state to another.
+    """Return the text with a line from one state to another.
 
     Args:
         file: The path.
@@ -84,7 +84,7 @@ def _steps(program: Program, table: Table, state: str, workspace: Workspace) -> 
 def _ways(
     table: Table, steps: Steps, graph: StateGraph, values: dict[str, Value], target: str
 ) -> Iterator[tuple[str, str]]:
-    """Yield heading and text of actions that may go to a state: as another line says it, with the name put in, as the language does."""
+    """Yield heading and text of actions that may go to a state: as another line does, with the state's name, or as the language does."""
     like = list[tuple[str, str]]()
     for line in table.every_line:
         for action in line.actions:
@@ -102,7 +102,7 @@ def _ways(
 
 
 def _with_line(text: str, name: str, state: str, source: str, way: tuple[str, str]) -> Drawn:
-    """The text with a line after the last, before DEFAULT; columns that it needs are added."""
+    """Return the text with a line after the last, before DEFAULT; missing columns are added."""
     heading, action = way
     text = _with_column(text, name, state, action=False)
     text = _with_column(text, name, heading, action=True)
@@ -130,7 +130,7 @@ def _with_column(text: str, name: str, heading: str, *, action: bool) -> str:
 
 
 def _leads(program: Program, name: str, line: str, state: str, workspace: Workspace, goal: Value) -> bool:
-    """Whether the new line goes there."""
+    """Tell whether the new line goes to the state."""
     table = next(each for each in program.tables if each.name == name)
     new = next((each for each in table.lines if each.name == line), None)
     try:

@@ -58,7 +58,7 @@ class Sheet:
 
 
 def sheet_of(table: WrittenTable) -> Sheet:
-    """What a table says."""
+    """Return the cells of a table."""
     parts = [_read(part) for part in table.parts]
     many = max((len(part.lines) for part in table.parts), default=0)
     headings = [cell.text for heading, _ in parts for cell in heading.conditions[1:]]
@@ -80,7 +80,7 @@ def sheet_of(table: WrittenTable) -> Sheet:
 
 
 def _read(part: WrittenPart) -> tuple[Cells, list[Cells]]:
-    """The cells of a part; rows with too many or too few as many as its heading has."""
+    """Return the cells of a part; rows with too many or too few are fitted to its heading."""
     heading = joined_cells(part.heading)
     return heading, [_fitted(joined_cells(rows), heading, rows[0].past) for rows in part.lines]
 
@@ -274,13 +274,13 @@ def without_column(text: str, name: str, at: int) -> str:
 
 
 def fresh(sheet: Sheet, at: int) -> str:
-    """A name for a line before position `at` that no other has."""
+    """Return a name for a line before position `at` that no other has."""
     names = [name_of(stub) for stub in sheet.stubs]
     return fresh_name(names, names[at - 1] if 0 < at <= len(names) else "")
 
 
 def name_of(stub: str) -> str:
-    """The name in a stub, without its marks."""
+    """Return the name in a stub, without its marks."""
     return stub_of(Cell(stub, "", 0)).name.text
 
 
@@ -295,7 +295,7 @@ def _table(text: str, name: str) -> WrittenTable:
 
 
 def _checked(text: str) -> str:
-    """A cell's text in one line.
+    """Return a cell's text in one line.
 
     Raises:
         Refused: No cell can hold it.
@@ -317,10 +317,10 @@ def _checked(text: str) -> str:
 
 
 def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
-    """The text laid out, if its table says what was asked for.
+    """Lay out the text, if its table has the wanted cells.
 
     Raises:
-        Refused: It does not.
+        Refused: Its table has other cells.
     """
     table = table_of(after, name)
     if table is None or sheet_of(table) != wanted:
@@ -360,7 +360,7 @@ def _found(table: WrittenTable, place: GridCell) -> tuple[tuple[RowText, ...], C
 
 
 def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[_Splice]:
-    """Yield what writes stubs that changed, in every part, and new names where other lines name a line by its old one."""
+    """Yield the splices that write changed stubs in every part, and new names where other lines name a line by its old one."""
     renamed = {
         name_of(old): name_of(new)
         for old, new in zip(before, after, strict=True)
@@ -382,7 +382,7 @@ def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[st
 
 
 def _renamed(before: Sheet, after: Sheet) -> Sheet:
-    """What is to come out, where lines that name others follow a new name."""
+    """Return the wanted sheet, in which lines that name others follow a new name."""
     renamed = {
         name_of(old): name_of(new)
         for old, new in zip(before.stubs, after.stubs, strict=True)
@@ -399,7 +399,7 @@ def _renamed(before: Sheet, after: Sheet) -> Sheet:
 
 
 def _part_of(table: WrittenTable, at: int, *, action: bool, inside: bool = False) -> tuple[WrittenPart, int]:
-    """The part that has a column, or takes one before it, and the column's position among its own of this kind."""
+    """Find the part that has a column, or takes one before it, and the column's position among its own of this kind."""
     parts = table.parts
     every = [joined_cells(part.heading) for part in parts]
     at -= sum(len(heading.conditions) - 1 for heading in every) if action else 0
@@ -414,7 +414,7 @@ def _part_of(table: WrittenTable, at: int, *, action: bool, inside: bool = False
 def _reshaped(
     table: WrittenTable, part: WrittenPart, change: Callable[..., tuple[tuple[str, ...], tuple[str, ...]]]
 ) -> Iterator[_Splice]:
-    """Yield what gives every row of a part other cells; `change` is told whether it is the first of the heading."""
+    """Yield the splices that give every row of a part other cells; `change` is told whether a row is the first of the heading."""
     for row in table.rows_of(part):
         body, mark, comment = row.partition("#")
         tail = f" {mark}{comment}" if mark else ""
@@ -435,7 +435,7 @@ def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " 
 
 
 def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> _Splice:
-    """What writes a row before the line at a position of a part."""
+    """Return the splice that writes a row before the line at a position of a part."""
     if at < len(part.lines):
         start, _ = whole_line(text, part.lines[at][0])
         indent = text[start : part.lines[at][0].start]

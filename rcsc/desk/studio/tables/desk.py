@@ -80,7 +80,7 @@ class Desk:
     # --- what there is ---
 
     def files(self) -> list[Json]:
-        """Every file that has tables, with their names, and the levels that run them; what was asked for first, then the system's."""
+        """Return every file with tables, their names, and the levels that run them; the file asked for comes first, then the system's."""
         levels = self._levels()
         found: list[dict[str, Any]] = []
         for path in listed([self.root])[:MOST_FILES]:
@@ -102,7 +102,7 @@ class Desk:
         return self._first is not None and Path(self.root, name).is_relative_to(self._first)
 
     def _levels(self) -> dict[str, list[str]]:
-        """By file the levels whose program has it, from the top down."""
+        """Return, by file, the levels whose program has it, from the top down."""
         found: dict[str, list[str]] = {}
         try:
             specs = description(self.system).levels
@@ -120,7 +120,7 @@ class Desk:
     # --- files ---
 
     def opened(self, name: str) -> Document:
-        """An open file; opens it where it is not.
+        """Return a file's document; open the file where it is not open.
 
         Raises:
             Refused: The project has no such file, or it cannot be read.
@@ -136,7 +136,7 @@ class Desk:
             return self._open[name]
 
     def _path(self, name: str) -> str:
-        """Where a file is, by the one name that it has here: under two of them it would have two texts.
+        """Return the path of a file with its one name here: under two names it would have two texts.
 
         Raises:
             Refused: The project has no such file.
@@ -148,10 +148,10 @@ class Desk:
         return os.path.realpath(path)
 
     def _forget(self) -> None:
-        """Close a file that has nothing to lose.
+        """Close a file without unsaved changes.
 
         Raises:
-            Refused: There is none.
+            Refused: Every open file has unsaved changes.
         """
         idle = next((name for name, each in self._open.items() if not each.dirty), None)
         if idle is None:
@@ -162,21 +162,21 @@ class Desk:
         self._do(PROOF, lambda: self._let_go(idle, gone.file))
 
     def _let_go(self, name: str, file: str) -> None:
-        """Forget the text of a file that was closed, in the lane `proof`; not where it is open again."""
+        """Forget the text of a closed file, in the lane `proof`, unless it is open again."""
         with self._lock:
             if name not in self._open:
                 self.workspace.close(file)
 
     def texts(self) -> dict[str, str]:
-        """The text of every open file, by its path."""
+        """Return the text of every open file, by its path."""
         with self._lock:
             return {each.file: each.text for each in self._open.values()}
 
     def named(self, path: str) -> str:
-        """The name of a file of the project by its path.
+        """Return the name of a file of the project by its path.
 
         Raises:
-            Refused: It is outside.
+            Refused: The file is outside the project.
         """
         name = self._name(path)
         if name.startswith("../"):
@@ -184,10 +184,10 @@ class Desk:
         return name
 
     def at(self, name: str, version: int) -> Document:
-        """An open file whose text is the one that a page has seen.
+        """Return an open file whose text is the one that a page has seen.
 
         Raises:
-            Refused: It is another one by now.
+            Refused: The text has changed.
         """
         found = self.opened(name)
         if found.version != version:
@@ -195,7 +195,7 @@ class Desk:
         return found
 
     def change(self, name: str, make: Callable[[Document], object]) -> Json:
-        """Change an open file, tell every page, and have it looked at; the answer for the page that asked.
+        """Change an open file, tell every page, and queue a check; return the answer for the page that asked.
 
         Raises:
             Refused: As `make` does; nothing was changed then.
@@ -213,14 +213,14 @@ class Desk:
             return {"version": found.version, "made": made}
 
     def show(self, name: str) -> Json:
-        """Tell every page of an open file; what was told."""
+        """Tell every page of an open file; return the message."""
         with self._lock:
             shown = document(name, self._open[name], self._known.get(name))
         self._tell(f"tables.file/{name}", shown)
         return shown
 
     def look_at_disk(self) -> None:
-        """Take what others wrote into open files that have no changes here, and look again at tables that use what they wrote.
+        """Take others' writes into open files without changes here, and check again the tables that use what was written.
 
         A file is looked at once it is as it was the last time: an editor may write it piece by piece.
         """
@@ -249,7 +249,7 @@ class Desk:
     # --- what is known ---
 
     def _outdate(self, name: str) -> None:
-        """Let nothing be known of the open files that use one whose text is another now."""
+        """Discard the results of open files that use a file whose text has changed."""
         changed = self._open[name].file
         for each, known in list(self._known.items()):
             if each != name and each in self._open and changed in known.files:
@@ -257,7 +257,7 @@ class Desk:
                 self.show(each)
 
     def look_again(self, name: str) -> None:
-        """Look at a file again if others wrote into files that it uses, and that are not open."""
+        """Check a file again if others wrote into files that it uses, and that are not open."""
         self._do(PROOF, lambda: self._look_if_outdated(name))
 
     def _look_if_outdated(self, name: str) -> None:
@@ -274,7 +274,7 @@ class Desk:
         self._do(PROOF, lambda: self._look(name))
 
     def _look(self, name: str) -> None:
-        """Look at a file as it is now, in the lane `proof`; other files that use it, too, where they are open."""
+        """Check a file as it is now, in the lane `proof`; also open files that use it."""
         self._look_at(name)
         with self._lock:
             outdated = [each for each in self._open if each in self._known and not self._sure(each)]
@@ -282,7 +282,7 @@ class Desk:
             self._look_at(each)
 
     def _sure(self, name: str) -> bool:
-        """Whether the cached results of an open file match its current text."""
+        """Tell whether the cached results of an open file match its current text."""
         known = self._known.get(name)
         return known is not None and known.version == self._open[name].version
 
@@ -320,7 +320,7 @@ class Desk:
         """What is known of the text that a page has seen; looks at it first, where nobody has. In the lane `proof`.
 
         Raises:
-            Refused: It is another one by now.
+            Refused: The text has changed.
         """
         self.at(name, version)
         self._look_if_outdated(name)
@@ -328,7 +328,7 @@ class Desk:
         return self.still_known(name, version)
 
     def answered(self, name: str) -> Answer | None:
-        """What is known of the text of an open file as it is; None while nobody has looked at it."""
+        """Return the answer to the present text of an open file; None while nobody has checked it."""
         with self._lock:
             known = self._known.get(name) if name in self._open else None
             return known.answer if known is not None and self._sure(name) else None
@@ -337,7 +337,7 @@ class Desk:
         """What is known of the text that a page has seen, and of all that it uses as that is now.
 
         Raises:
-            Refused: One of them is another by now.
+            Refused: A text has changed.
         """
         with self._lock:
             self.at(name, version)
@@ -347,10 +347,10 @@ class Desk:
             return known
 
     def checked(self, name: str, version: int) -> Checked:
-        """The program of the text that a page has seen, in the lane `proof`.
+        """Return the checked text that a page has seen, in the lane `proof`.
 
         Raises:
-            Refused: It is another one by now.
+            Refused: The text has changed.
         """
         self.known(name, version)
         with PROVER:
@@ -358,7 +358,7 @@ class Desk:
             return self.workspace.checked(os.path.normpath(self.opened(name).file))
 
     def repairs(self, name: str, version: int, finding: int) -> tuple[Repair, ...]:
-        """Repairs of a finding, made and checked once; in the lane `proof`.
+        """Return the repairs of a finding, made and checked once; in the lane `proof`.
 
         Raises:
             Refused: There is no such finding, or the text is another one by now.
@@ -381,7 +381,7 @@ class Desk:
         return self._offered[key]
 
     def keep_unsaved(self) -> list[str]:
-        """Keep every text that nobody saved, each in a file that takes no other's place; what was kept, and where, a sentence each."""
+        """Save every unsaved text in a file that replaces no other; return a sentence each about the text and its file."""
         folder = Path(self.root, FOLDER, UNSAVED, f"{time.strftime('%Y-%m-%d_%H-%M-%S')}_{os.getpid()}")
         said = []
         for name, each in self.others():
@@ -396,17 +396,17 @@ class Desk:
         return said
 
     def unwritten(self) -> frozenset[str]:
-        """The real paths of texts that are changed here and not saved."""
+        """Return the real paths of texts that are changed here and not saved."""
         return frozenset(os.path.realpath(each.file) for _, each in self.others() if each.dirty)
 
     def others(self) -> Iterator[tuple[str, Document]]:
-        """Every open file."""
+        """Yield every open file."""
         with self._lock:
             yield from list(self._open.items())
 
 
 def _mark(file: str) -> Mark:
-    """What is another where somebody wrote; None where there is no file."""
+    """Return a mark that changes when somebody writes the file; None where there is no file."""
     try:
         stat = Path(file).stat()
     except OSError:
@@ -415,7 +415,7 @@ def _mark(file: str) -> Mark:
 
 
 def _glance(path: str) -> str:
-    """The beginning of a file; empty where it cannot be read."""
+    """Return the beginning of a file; empty where it cannot be read."""
     try:
         return beginning(Path(path), MOST_LISTED_BYTES).decode(errors="replace")
     except (OSError, Malformed):

@@ -32,7 +32,7 @@ BOM = b"\xef\xbb\xbf"
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A change: what stood at an offset, and what stands there now."""
+    """A change: the old text at an offset, and the new one."""
 
     start: int
     old: str
@@ -40,16 +40,16 @@ class Step:
     what: str
 
     def done(self, text: str) -> str:
-        """The text with it."""
+        """Return the text with the change."""
         return text[: self.start] + self.new + text[self.start + len(self.old) :]
 
     def undone(self, text: str) -> str:
-        """The text without it."""
+        """Return the text without the change."""
         return text[: self.start] + self.old + text[self.start + len(self.new) :]
 
 
 def step(before: str, after: str, what: str) -> Step:
-    """The change from one text to another: the least piece that differs.
+    """Return the change from one text to another: the smallest piece that differs.
 
     >>> step("one two three", "one 2 three", "type")
     Step(start=4, old='two', new='2', what='type')
@@ -61,7 +61,7 @@ def step(before: str, after: str, what: str) -> Step:
 
 
 def _alike(one: str, other: str) -> int:
-    """How many characters two texts have in common at their beginning; asked by halves, for texts are long and alike.
+    """Count the characters that two texts have in common at their beginning; by bisection, for texts are long and alike.
 
     >>> _alike("state_2", "state_3"), _alike("", "a")
     (6, 0)
@@ -107,23 +107,23 @@ class Document:
 
     @property
     def dirty(self) -> bool:
-        """Whether the text is not what is on disk."""
+        """True if the text differs from the one on disk."""
         return self.text != self.saved
 
     @property
     def undoes(self) -> str:
-        """What would be undone next; empty for nothing."""
+        """The name of the change that would be undone next; empty for none."""
         return self._done[-1].what if self._done else ""
 
     @property
     def redoes(self) -> str:
-        """What would be done again next; empty for nothing."""
+        """The name of the change that would be done again next; empty for none."""
         return self._undone[-1].what if self._undone else ""
 
     # --- changes ---
 
     def replace(self, text: str, what: str) -> bool:
-        """Let the text be another one; whether it is."""
+        """Replace the text; return whether it changed."""
         if text == self.text:
             return False
         made, now = step(self.text, text, what), time.monotonic()
@@ -139,7 +139,7 @@ class Document:
         return True
 
     def edited(self, edits: Sequence[Edit]) -> str:
-        """The text with edits, each of it as it is.
+        """Return the text with edits, whose areas are those of the present text.
 
         Raises:
             Refused: They overlap.
@@ -150,10 +150,10 @@ class Document:
         return plain(Lines(self.text).applied(edits))
 
     def undo(self) -> str:
-        """Take back the last change; what it was.
+        """Take back the last change; return its name.
 
         Raises:
-            Refused: There is none.
+            Refused: There is no change to take back.
         """
         if not self._done:
             raise Refused(Code.STUDIO, "nothing is left to undo")
@@ -163,10 +163,10 @@ class Document:
         return last.what
 
     def redo(self) -> str:
-        """Make the change again that was taken back last; what it was.
+        """Make the change again that was taken back last; return its name.
 
         Raises:
-            Refused: There is none.
+            Refused: There is no change to make again.
         """
         if not self._undone:
             raise Refused(Code.STUDIO, "nothing was undone")
@@ -185,7 +185,7 @@ class Document:
         return (BOM if self.disk.startswith(BOM) else b"") + text.replace("\n", self.end).encode()
 
     def bytes_of(self, text: str) -> int:
-        """How long the file would be with a text.
+        """Return the size of the file with a text, in bytes.
 
         Raises:
             Refused: No file can hold it.
@@ -196,14 +196,14 @@ class Document:
             raise Refused(Code.STUDIO, "the text has half a character, which no file can hold") from error
 
     def on_disk(self) -> str:
-        """How the disk is: `same` as known here, `changed` by others, or `gone`."""
+        """Compare the file on disk: `same` as known here, `changed` by others, or `gone`."""
         try:
             return "same" if _read(self.file) == self.disk else "changed"
         except Refused:
             return "gone"
 
     def save(self, *, over: bool = False) -> bool:
-        """Write the file, laid out as `rcsc fmt` does it; whether it was laid out, which a text that does not parse is not.
+        """Write the file, laid out as by `rcsc fmt`; return whether it was laid out, which a text that does not parse is not.
 
         Args:
             over: Whether what others wrote meanwhile may be lost.
@@ -235,7 +235,7 @@ class Document:
         return laid_out is not None
 
     def keep(self, folder: Path) -> Path:
-        """Write the text as it is into another folder; where it is then.
+        """Write the text as it is into another folder; return its path there.
 
         Raises:
             OSError: It cannot be written.
@@ -246,7 +246,7 @@ class Document:
         return path
 
     def take_disk(self) -> bool:
-        """Let the text be what is on disk, which can be undone; whether it changed.
+        """Replace the text by that on disk, which can be undone; return whether it changed.
 
         Raises:
             Refused: It cannot be read.
@@ -257,12 +257,12 @@ class Document:
 
 
 def plain(text: str) -> str:
-    """A text whose lines end with a line feed."""
+    """Return a text with line feeds as its line ends."""
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _too_many(steps: Sequence[Step]) -> int:
-    """How many of the first steps are to be forgotten."""
+    """Count the first steps that are to be forgotten."""
     kept, left = 0, MOST_KEPT
     for each in reversed(steps[-MOST_STEPS:]):
         left -= len(each.old) + len(each.new)
@@ -277,7 +277,7 @@ def _typed(made: Step) -> bool:
 
 
 def _joins(last: Step, made: Step) -> bool:
-    """Whether a letter was typed after the last one."""
+    """Tell whether a letter was typed right after the last one."""
     return (
         _typed(made) and not last.old and made.start == last.start + len(last.new) and last.what == made.what
     )
@@ -295,7 +295,7 @@ def _read(file: str) -> bytes:
 
 
 def _text(file: str, raw: bytes) -> tuple[str, str]:
-    """The text, and how its lines end."""
+    """Decode a file; return the text and its line end."""
     try:
         text = raw.removeprefix(BOM).decode()
     except UnicodeDecodeError as error:

@@ -55,7 +55,7 @@ class Tables(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "tables.list": lambda _: self._desk.files(), "tables.open": self._open, "tables.edit": self._edit,
             "tables.cells": self._cells, "tables.line": self._line, "tables.delete": self._delete, "tables.column": self._column,
@@ -64,23 +64,23 @@ class Tables(Concern):
         }  # fmt: skip
 
     def greeting(self) -> Json:
-        """The files that have tables."""
+        """Return the files that have tables."""
         return {"files": self._desk.files()}
 
     def begin(self) -> None:
-        """Look at the disk from now on, where another editor may write."""
+        """Watch the disk from now on, where another editor may write."""
         try:
             self._desk.look_at_disk()
         finally:
             self._later(self.begin, LOOKED_S)
 
     def close(self) -> None:
-        """Keep what nobody saved."""
+        """Keep the unsaved texts."""
         for said in self._desk.keep_unsaved():
             self._part(said)
 
     def _open(self, ask: Ask) -> Json:
-        """Open a file; one that has no changes here is read again where others changed it."""
+        """Open a file; one without changes here is read again if others changed it."""
         name = ask.body.text("file")
         found = self._desk.opened(name)
         disk = found.on_disk()
@@ -91,7 +91,7 @@ class Tables(Concern):
         return self._desk.show(name) | {"disk": disk}
 
     def _changed(self, ask: Ask, make: Callable[[Document], tuple[str, str]]) -> Json:
-        """Let a file's text be another one; `make` says which, and what that is called."""
+        """Replace a file's text by the one that `make` returns, with the name of the change."""
 
         def change(found: Document) -> object:
             text, what = make(found)
@@ -102,7 +102,7 @@ class Tables(Concern):
         return self._done(ask, change)
 
     def _done(self, ask: Ask, change: Callable[[Document], object]) -> Json:
-        """Do something with the text that the page has seen, and with no other."""
+        """Do a change to the text that the page has seen, and to no other."""
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
 
         def of_that(found: Document) -> object:
@@ -176,7 +176,7 @@ class Tables(Concern):
         )
 
     def _key(self, ask: Ask) -> Json:
-        """Do what a key does in a table of the text; where the cursor is then, null where it is in none."""
+        """Do what a key does in a table of the text; return the cursor, null where it is in none."""
         key, at = (
             ask.body.text("key"),
             Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES)),
@@ -204,7 +204,7 @@ class Tables(Concern):
         return self._done(ask, Document.redo)
 
     def _save(self, ask: Ask) -> Json:
-        """Write a file; says whether it was laid out."""
+        """Write a file; report whether it was laid out."""
         over = ask.body.flag("over")
         return self._desk.change(ask.body.text("file"), lambda found: found.save(over=over))
 
@@ -235,7 +235,7 @@ def _edit(file: str, lines: Lines, given: CheckedFields) -> Edit:
 
 
 def _longer(text: str, table: str, least: int) -> str:
-    """The text, its table with as many lines at least; before a DEFAULT line, which is the last."""
+    """Return the text with at least so many lines in its table; new ones come before a DEFAULT line, which is the last."""
     while True:
         many, default = _lines_of(text, table)
         if many >= least or many + default >= least + cells.MOST_CELLS:
@@ -244,7 +244,7 @@ def _longer(text: str, table: str, least: int) -> str:
 
 
 def _over_default(text: str, table: str, line: int, column: int, rows: Sequence[Sequence[str | None]]) -> int:
-    """1 where a paste that begins above a DEFAULT line and brings none would write over it: its lines go before that one, else 0."""
+    """Return 1 where a paste begins above a DEFAULT line, brings none, and would write over it: its lines go before that one; else 0."""
     many, default = _lines_of(text, table)
     firsts = [row[-column] for row in rows if 0 <= -column < len(row)]
     over = default and line < many - 1 < line + len(rows) and len(firsts) > many - 1 - line
@@ -256,7 +256,7 @@ def _over_default(text: str, table: str, line: int, column: int, rows: Sequence[
 
 
 def _lines_of(text: str, table: str) -> tuple[int, int]:
-    """How many lines a table has, and whether the last is DEFAULT."""
+    """Return the number of a table's lines, and 1 if the last is DEFAULT, else 0."""
     from rcsc.lang.written.tables import table_of
 
     found = table_of(text, table)

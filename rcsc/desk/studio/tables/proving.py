@@ -46,7 +46,7 @@ class Proof(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "proof.repairs": self._repairs,
             "proof.repair": self._repair,
@@ -62,7 +62,7 @@ class Proof(Concern):
         return [shown.repair(at, each) for at, each in enumerate(self._offered(ask)[2])]
 
     def _repair(self, ask: Ask) -> Json:
-        """Make a repair that was offered, where the texts are as they were when it was checked."""
+        """Make an offered repair, if the texts are as they were when it was checked."""
         name, version, offered = self._offered(ask)
         at = ask.body.whole("repair", 0, 1_000_000)
         if at >= len(offered):
@@ -80,7 +80,7 @@ class Proof(Concern):
         return self._desk.change(file, make)
 
     def _run(self, ask: Ask) -> Json:
-        """Run a table for one look at an input that shows a finding, by the interpreter: nothing need be proved or compiled for it."""
+        """Run one cycle of a table in the interpreter, for an input that shows a finding: nothing need be proved or compiled for it."""
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
         number, at = ask.body.whole("finding", 0, 1_000_000), ask.body.whole("input", 0, 1_000_000)
         findings = self._desk.known(name, version).answer.findings
@@ -92,7 +92,7 @@ class Proof(Concern):
         return {"comes": comes, "lines": lines}
 
     def _filter(self, ask: Ask) -> Json:
-        """Say which lines of a table can match where a condition holds."""
+        """Report the lines of a table that can match where a condition holds."""
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
         condition = " ".join(ask.body.text("condition").split())
         if not condition or len(condition) > LONGEST_CONDITION:
@@ -111,10 +111,10 @@ class Proof(Concern):
         return {"can": under.can, "unknown": under.unknown, "every": under.every}
 
     def _meant(self, found: Document, condition: str) -> Expr:
-        """The condition as the program has it.
+        """Return the condition as the program has it.
 
         Raises:
-            Refused: It is none, or names what is not there.
+            Refused: The text is no condition, or has an unknown name.
         """
         try:
             terms_of(condition)
@@ -141,11 +141,11 @@ class Graphs(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {"graph.show": self._show, "graph.draw": self._draw}
 
     def _show(self, ask: Ask) -> Json:
-        """Place the graph of a table, some of its composite states shut."""
+        """Lay out the graph of a table, some of its composite states shut."""
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
         derived, chart = self._derived(ask, name, version, ask.body.text("table"))
         names = [each.name for each in chart.composites]
@@ -189,7 +189,7 @@ class Graphs(Concern):
         return self._kept[key][1:]
 
     def _draw(self, ask: Ask) -> Json:
-        """Add a line that leads from a state to another; its name, and where it stands."""
+        """Add a line that leads from a state to another; return its name and its place."""
         name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
         table_name = ask.body.text("table")
         derived, _ = self._derived(ask, name, version, table_name)
@@ -213,10 +213,10 @@ class Graphs(Concern):
 
 
 def _table_of(program: Program | None, name: str, ask: Ask) -> tuple[Program, Table]:
-    """A table of a program that is in order.
+    """Return a table of a program that is in order.
 
     Raises:
-        Refused: It is not, or has no such table.
+        Refused: The program is not in order, or has no such table.
         CancelledError: Nobody waits.
     """
     ask.check()
@@ -229,7 +229,7 @@ def _table_of(program: Program | None, name: str, ask: Ask) -> tuple[Program, Ta
 
 
 def _file_of(files: Mapping[str, tree.File], table: Table) -> tree.File:
-    """The file that declares a table."""
+    """Return the file that declares a table."""
     return next(
         file for path, file in files.items() if os.path.realpath(path) == os.path.realpath(table.file)
     )

@@ -92,7 +92,7 @@ def _row(row: GridRow) -> Json:
 
 
 def _share(count: int, whole: int) -> Json:
-    """A share in words; more inputs than a number of JavaScript tells apart are counted to the last one."""
+    """Return a share in words; more inputs than a number of JavaScript tells apart are counted to the last one."""
     return {"text": share_text(count, whole), "of": f"{count:,} of {_inputs(whole)}"}
 
 
@@ -133,7 +133,7 @@ def _finding(file: str, lines: Lines, number: int, found: Finding, known: TextFi
 
 
 def _cell(table: Grid, area: Area) -> tuple[str | None, int | None]:
-    """The line and the column in which a finding begins; -1 is the column of names."""
+    """Return the line and the column in which a finding begins; -1 is the column of names."""
     for row in table.rows:
         for at, cell in enumerate((row.stub, *row.cells), start=-1):
             if any(piece.start <= area.start < piece.end for piece in cell.areas):
@@ -179,13 +179,13 @@ def _snapshot(program: Program, witness: Witness) -> Snapshot:
 
 
 def _value(table: Table, column: int, snapshot: Snapshot) -> str:
-    """What the witness has under a heading."""
+    """Return the witness's value under a heading."""
     subject = table.columns[column].subject
     return "" if subject is None else spell(subject.type, evaluate(subject, snapshot))
 
 
 def _rows(table: Table, snapshot: Snapshot) -> Iterator[tuple[str, Json]]:
-    """Yield for each line whether the witness matches it, and the columns that keep it from it; None where nobody can tell."""
+    """Yield for each line whether the witness matches it, and the columns that keep it from it; None where that cannot be told."""
     matched = list[bool | None]()
     for line in table.lines:
         tests = [None if test is None else _tried(partial(holds, test, snapshot)) for test in line.tests]
@@ -200,7 +200,7 @@ def _rows(table: Table, snapshot: Snapshot) -> Iterator[tuple[str, Json]]:
 
 
 def _tried(ask: Callable[[], Any]) -> Any:
-    """An answer; None where the witness does not say enough."""
+    """Return an answer; None where the witness lacks a value for it."""
     try:
         return ask()
     except (KeyError, ArithmeticError, IndexError, ValueError):
@@ -208,7 +208,7 @@ def _tried(ask: Callable[[], Any]) -> Any:
 
 
 def repair(number: int, offered: Repair) -> Json:
-    """Return a repair, as a button that says what it does and what is known of it."""
+    """Return a repair, as a button with its effect and its proof."""
     return {
         "id": number,
         "title": offered.title,

@@ -37,7 +37,7 @@ class Writing(Concern):
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind."""
+        """The handlers by kind."""
         return {
             "text.offers": self._offers,
             "text.about": self._about,
@@ -46,10 +46,10 @@ class Writing(Concern):
         }
 
     def _names(self, ask: Ask) -> tuple[Names, str]:
-        """The names of a file as a page has seen it, with all that it uses, and its path.
+        """Return the names of a file as a page has seen it, with all that it uses, and its path.
 
         Raises:
-            Refused: The text is another one by now.
+            Refused: The text has changed.
         """
         path = os.path.normpath(
             self._desk.at(ask.body.text("file"), ask.body.whole("version", 1, 2**53)).file
@@ -63,13 +63,13 @@ class Writing(Concern):
         return Names(reading.files, reading.sources, reading.nearest), path
 
     def _at(self, ask: Ask) -> tuple[Names, str, int]:
-        """The same, and the offset of the place that is asked about."""
+        """Return the same, and the offset of the place in the question."""
         names, path = self._names(ask)
         place = Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES))
         return names, path, Lines(names.sources[path].text).offset(place, Units.UTF_16)
 
     def _offers(self, ask: Ask) -> Json:
-        """What could stand at a place."""
+        """Return the completions at a place."""
         names, path, offset = self._at(ask)
         made = grids(path, Lines(names.sources[path].text), names.program, lambda _: BEING_PROVED)
         found = offers(names, {each.name: each for each in made}, path, offset)
@@ -78,7 +78,7 @@ class Writing(Concern):
         ]
 
     def _about(self, ask: Ask) -> Json:
-        """What is known of the name at a place, in Markdown, and where the name stands; null for no name."""
+        """Describe the name at a place, in Markdown, with the name's area; null for no name."""
         names, path, offset = self._at(ask)
         name = names.at(path, offset)
         if name is None:
@@ -88,7 +88,7 @@ class Writing(Concern):
         return {"text": about(names, name, known), **_area(names, name)}
 
     def _declared(self, ask: Ask) -> Json:
-        """Where the name at a place is declared; null where that is nowhere."""
+        """Return the declaration of the name at a place; null where there is none."""
         names, path, offset = self._at(ask)
         name = names.at(path, offset)
         if name is None:
@@ -100,7 +100,7 @@ class Writing(Concern):
         return None if found is None else {"file": self._desk.named(found.span.file), **_area(names, found)}
 
     def _colours(self, ask: Ask) -> Json:
-        """What each word of a text is: line, column, length and type, one after another."""
+        """Return the token of each word of a text: line, column, length and type, one after another."""
         names, path = self._names(ask)
         lines, numbers = Lines(names.sources[path].text), list[int]()
         for token in tokens(names, path):

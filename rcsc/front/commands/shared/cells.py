@@ -27,7 +27,7 @@ def cell_of(log: Log, path: Path) -> DrawnCell:
 
 
 class Drawn:
-    """Draws ticks of logs of a system; what it is made of is read once a log.
+    """Draws ticks of logs of a system; the cell of a log is made once.
 
     Args:
         path: Of the description.
@@ -40,7 +40,7 @@ class Drawn:
 
     @property
     def can(self) -> bool:
-        """Whether the system says who could draw it."""
+        """True if the system names its drawer."""
         try:
             system = description(self._path)
         except BadDescription:

@@ -28,7 +28,7 @@ The extras `graph` and `shell` are not here: without them another layout program
 
 
 def need(extra: str) -> None:
-    """Stop a command before its work where that work would end at a missing package.
+    """Stop a command before its work, if that would end at a missing package.
 
     Raises:
         Stopped: A package of the extra is not installed.
@@ -43,7 +43,7 @@ def _missing(package: str, extra: str) -> Stopped:
 
 
 def lacking(error: ModuleNotFoundError) -> Stopped | None:
-    """Which extra to install, where an import finds that one of its packages is missing."""
+    """Return the stop that names the extra to install, where an import misses one of its packages; else None."""
     package = (error.name or "").partition(".")[0]
     extra = next((name for name, packages in EXTRAS.items() if package in packages), None)
     return None if extra is None else _missing(package, extra)

@@ -23,7 +23,7 @@ OUT = click.option("-o", "--output", "out", type=click.Path(path_type=Path), def
 
 
 class WrongError(Exception):
-    """What is wrong, to be shown; the texts that it points into."""
+    """Diagnostics to be shown, with the texts that they point into."""
 
     def __init__(
         self, diagnostics: tuple[Diagnostic, ...], sources: Mapping[str, Source] | None = None
@@ -32,7 +32,7 @@ class WrongError(Exception):
         self.diagnostics, self.sources = diagnostics, sources or {}
 
     def shown(self, command: str) -> int:
-        """Show what is wrong; return the exit status."""
+        """Show the diagnostics; return the exit status."""
         show(
             Report(tuple(sorted(set(self.diagnostics), key=sort_key)), sources=self.sources),
             command,
@@ -42,11 +42,11 @@ class WrongError(Exception):
 
 
 def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
-    """The tables that are named; where a name is that of several, which one is meant is said on standard error.
+    """Find the tables of a name; where several have it, report on standard error which is taken.
 
     Raises:
         UsageError: A file is named that is not there.
-        WrongError: There are none, or their files are not in order.
+        WrongError: There are no such tables, or their files are not in order.
     """
     file = named if named.endswith(".rcs") else named.rpartition(":")[0]
     if file.endswith(".rcs") and not Path(file).exists():
@@ -62,7 +62,7 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
 
 
 def _of_system() -> tuple[str, ...]:
-    """The root files of the levels of the system that is here; none where there is no system, or its description is not in order."""
+    """Return the root files of the levels of the system here; none where there is no system, or its description is invalid."""
     try:
         return tables_in((), (system_path(None),))
     except (NoSystem, BadDescription):

@@ -24,7 +24,7 @@ SHOWN = 12
 
 
 def told(command: Callable[..., int]) -> Callable[..., int]:
-    """What can go wrong with a log, as coded findings about FILE."""
+    """Turn the errors of a log into coded findings about FILE."""
 
     @wraps(command)
     def wrapped(file: Path, **kwargs: Any) -> int:
@@ -42,7 +42,7 @@ def told(command: Callable[..., int]) -> Callable[..., int]:
 
 
 def refuse(file: Path, code: Code, message: str, *, notes: tuple[str, ...] = (), help_: str = "") -> int:
-    """Show what is wrong with a log; return the exit status."""
+    """Show an error of a log; return the exit status."""
     place = Label(Span(str(file), 0, 0))
     diagnostic = Diagnostic(code, message, place, notes=notes, help=(help_,) if help_ else ())
     show(Report((diagnostic,)), "log", Output(quiet=True))

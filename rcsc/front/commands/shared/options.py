@@ -23,7 +23,7 @@ PATHS = click.argument(
 
 
 def cores() -> int:
-    """How many processors this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -31,12 +31,12 @@ class _Millions(click.FloatRange):
     """A number of millions on the command line, single ones in the program."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """The number; a default is converted like what is typed."""
+        """Return the number; a default is converted as a typed one is."""
         return max(1, round(super().convert(value, param, ctx) * 1_000_000))
 
 
 def steps_option(default: float, also: str = "") -> Callable[[Command], Command]:
-    """Adds `--steps`, in millions, and what else it bounds; the command gets `steps`, in single ones."""
+    """Add `--steps`, in millions, with a note on its further bounds; the command gets `steps`, in single ones."""
     return click.option(
         "--steps",
         type=_Millions(min=0, min_open=True),
@@ -49,7 +49,7 @@ def steps_option(default: float, also: str = "") -> Callable[[Command], Command]
 
 
 def proving(command: Command) -> Command:
-    """Adds the options that say how to prove; the command gets them as `options` and `use_cache`."""
+    """Add the options for proofs; the command gets them as `options` and `use_cache`."""
 
     @steps_option(20, " All questions about one table, or one procedure, get 20 times as many together.")
     @click.option(
@@ -100,7 +100,7 @@ def proving(command: Command) -> Command:
 
 
 def showing(command: Command) -> Command:
-    """Adds the options that say how to show the report; the command gets them as `output`."""
+    """Add the options for the form of the report; the command gets them as `output`."""
 
     @click.option(
         "--format",
@@ -145,11 +145,11 @@ def showing(command: Command) -> Command:
 
 
 def settings_of(options: Options, use_cache: bool, output: Output, paths: tuple[str, ...]) -> Settings:
-    """What the driver works on: these paths, or else this folder."""
+    """Return the driver's settings for these paths, or else for this folder."""
     progress = Progress(wanted=not output.quiet)
     return Settings(paths or (".",), options, piped(paths), use_cache=use_cache, progress=progress)
 
 
 def piped(paths: tuple[str, ...]) -> bytes | None:
-    """Return what `-` stands for, if it is one of the paths; of a text that is too large no more than shows it."""
+    """Read the text for `-`, if that is one of the paths; of a text that is too large, only enough to show it."""
     return standard_input().read(MOST_BYTES + 1) if "-" in paths else None

@@ -34,7 +34,7 @@ from rcsc.proof.solvers.smtlib import CVC5_STEPS, cvc5_refutes
 
 
 def standing(whole: SystemProof, level: str, key: Key) -> str:
-    """The verdict of a claim: `proved`, what it rests on that is not proved, or why it is not found itself."""
+    """Return the verdict of a claim in words: `proved`, the unproved claims that it rests on, or its own verdict."""
     closed = whole.of(level, key)
     if closed.proved:
         if closed.verdict.value != "proved":
@@ -44,12 +44,12 @@ def standing(whole: SystemProof, level: str, key: Key) -> str:
 
 
 def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
-    """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
+    """Return the assumptions that these verdicts trust, as the tables declare them; empty for none."""
     return report.trusting(declared(trust for key in keys for trust in whole.of(level, key).trusts))
 
 
 def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
-    """Claims in words; of a level that was not looked at itself, that alone."""
+    """Return claims in words; for a level that was not looked at, only the level."""
     looked_at = {proof.level for proof in whole.levels}
     others = dict.fromkeys(owner for owner, _ in needs if owner not in looked_at)
     claims = [spelled(need, level, whole.closed) for need in needs if need[0] in looked_at]
@@ -57,7 +57,7 @@ def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
 
 
 def not_looked_at(proof: LevelProof) -> Iterator[str]:
-    """Obligations that could not be stated, and those that do not apply."""
+    """Yield obligations that could not be stated, and those that do not apply."""
     for unstated in proof.unstated:
         yield f"{'not looked at' if unstated.applies else 'does not apply'}: {unstated.shown}"
 
@@ -96,7 +96,7 @@ def in_context(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> I
 
 
 def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
-    """What lines do that match again; nothing for a level that gives no orders."""
+    """Yield the effects of lines that match again; nothing for a level that gives no orders."""
     again = "; ".join(
         f"{repeated_line.table} {repeated_line.line}: {', '.join(repeated_line.leaves)}"
         for repeated_line in seen.repeated
@@ -109,7 +109,7 @@ def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
 
 
 def trusted(whole: SystemProof) -> Iterator[str]:
-    """What is taken for granted that no level is responsible for."""
+    """Yield the assumptions for which no level is responsible."""
     every = sorted({trust for closed in whole.closed.values() for trust in closed.trusts})
     if every:
         yield "taken for granted"
@@ -118,7 +118,7 @@ def trusted(whole: SystemProof) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What is proved of a system, as one line says it.
+    """The result of a system's proof in one line.
 
     Attributes:
         claims: How many there are, agreements between levels counted; `proved`, how many of them are, and `open`, how many are not.
@@ -134,11 +134,11 @@ class Summary:
     lacks: tuple[str, ...]
 
     def status(self, *, strict: bool) -> int:
-        """The exit status."""
+        """Return the exit status."""
         return 1 if self.open or (strict and (self.lacks or self.trusting)) else 0
 
     def line(self, *, strict: bool) -> str:
-        """The verdict, with its colour."""
+        """Return the verdict, with its colour."""
         many = counted(self.proved, "claim")
         if self.trusting:
             many += f", {self.trusting} of them trusting that {self.trusted}"
@@ -153,7 +153,7 @@ class Summary:
 
 
 def _trusted(whole: SystemProof) -> str:
-    """What claims trust of inputs, in short."""
+    """Return in short what claims trust of inputs."""
     clamped = [trust.endswith(IN_RANGE) for trust in whole.admitting]
     if all(clamped):
         return "inputs are in range at a restart"
@@ -161,7 +161,7 @@ def _trusted(whole: SystemProof) -> str:
 
 
 def summary(whole: SystemProof) -> Summary:
-    """Count what is proved of a system, and what is not."""
+    """Count the proved and the unproved claims of a system."""
     claims = [(level.level, obligation.key) for level in whole.levels for obligation, _ in level.verdicts]
     still_open = sum(len(level.open) for level in whole.levels)
     not_agreed = sum(not agreement.holds for agreement in whole.agreements)
@@ -194,7 +194,7 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
 
 
 def left_out(whole: SystemProof) -> Iterator[str]:
-    """Say which claims rest on what is not known, and on what."""
+    """Yield the claims that rest on unproved ones, with those."""
     resting = _resting(whole) if whole.proved else {}
     if resting:
         yield "resting on what is not known"
@@ -203,7 +203,7 @@ def left_out(whole: SystemProof) -> Iterator[str]:
 
 
 def _resting(whole: SystemProof) -> dict[str, list[str]]:
-    """Claims that rest on what is not proved, by what that is; those of a whole level say no more than each of its own."""
+    """Group claims by the unproved ones that they rest on; those of a whole level say no more than each of its own."""
     looked_at = {proof.level for proof in whole.levels}
     resting: dict[str, list[str]] = {}
     for (level, key), closed in whole.closed.items():
@@ -228,7 +228,7 @@ def _ends(ending: Ending) -> str:
 
 
 def _counted(line: str, counters: Sequence[RisingLine]) -> str:
-    """Say what a line is counted by: the first counter moves, or it stays and the next one does."""
+    """Describe the counter of a line: the first counter moves, or it stays and the next one does."""
     return f"line `{line}` runs as long as {', or stays and '.join(map(_moves, counters))}"
 
 
@@ -238,7 +238,7 @@ def _moves(rising: RisingLine) -> str:
 
 
 def assumptions(proof: SystemProof) -> str:
-    """How many assumptions there are, and how they stand."""
+    """Return the number of assumptions, by their verdicts."""
     claims = [
         proof.of(level.level, obligation.key)
         for level in proof.levels
@@ -257,7 +257,7 @@ def assumptions(proof: SystemProof) -> str:
 
 
 def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
-    """The way of a PAUSE from the top down, as far as levels are proved to pass it on at once."""
+    """Yield the way of a PAUSE from the top down, as far as levels are proved to pass it on at once."""
     passes = {
         (level.level, obligation.name)
         for level in proof.levels
@@ -287,7 +287,7 @@ def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Ite
 
 
 def pauses(systems: Mapping[str, TransitionSystem]) -> Iterator[str]:
-    """Which command each level that takes orders is paused by, whatever it is called."""
+    """Yield the command that pauses each level which takes orders, whatever its name."""
     first = {name: pause_of(ts) for name, ts in systems.items()}
     if any(first.values()):
         paused = ", ".join(f"`{member}` of `{name}`" for name, member in first.items() if member)
@@ -299,7 +299,7 @@ def pauses(systems: Mapping[str, TransitionSystem]) -> Iterator[str]:
 def _unless(
     said: str, systems: Mapping[str, TransitionSystem], begins: Callable[[TransitionSystem], Leaves]
 ) -> str:
-    """What is said of the orders with which levels begin, and of which it is not so."""
+    """Return the statement about the orders with which levels begin, with the exceptions."""
     others = []
     for name, ts in systems.items():
         begun = begins(ts)
@@ -309,12 +309,12 @@ def _unless(
 
 
 def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:
-    """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
+    """Return each question of the certificate, and whether cvc5 refutes it within two minutes."""
     return {name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(ts, proof).items()}
 
 
 def claim(whole: SystemProof, level: str, key: Key) -> dict[str, Any]:
-    """A verdict, what it rests on that is not found, and what it trusts."""
+    """Return a verdict, the unproved claims that it rests on, and its trusted assumptions."""
     closed = whole.of(level, key)
     return {
         "verdict": closed.verdict.value
@@ -329,7 +329,7 @@ def claim(whole: SystemProof, level: str, key: Key) -> dict[str, Any]:
 
 
 def as_json(whole: SystemProof, proof: LevelProof) -> dict[str, Any]:
-    """Context and endings of one level."""
+    """Return context and endings of one level."""
     again = (
         {} if proof.context is None else asdict(proof.context) | claim(whole, proof.level, (AGAIN, "", ""))
     )

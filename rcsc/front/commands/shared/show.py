@@ -44,7 +44,7 @@ from rcsc.base.host.files import write_atomically
 
 
 class OutputForm(StrEnum):
-    """How a report is shown."""
+    """The form of a report."""
 
     TEXT = "text"
     LINE = "line"
@@ -54,7 +54,7 @@ class OutputForm(StrEnum):
 
 
 class Color(StrEnum):
-    """When the text is coloured."""
+    """The cases in which the text is coloured."""
 
     AUTO = "auto"
     ALWAYS = "always"
@@ -63,7 +63,7 @@ class Color(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """Where and how a report is shown.
+    """The place and form of a report.
 
     Attributes:
         file: Written whole or not at all; None is standard output.
@@ -117,7 +117,7 @@ def put(text: str, file: Path | None) -> None:
 
 @contextmanager
 def writing(place: Path | str) -> Iterator[None]:
-    """Say where something was to be written, should that fail.
+    """Report the place that could not be written, if the code inside fails.
 
     Raises:
         UnwritableError: What stands inside could not write.
@@ -162,7 +162,7 @@ def _lines(report: Report, _command: str, output: Output, _closing: str) -> str:
 
 
 def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
-    """What a person is told."""
+    """Yield the diagnostics for a person."""
     for diagnostic in report.diagnostics:
         if not (output.quiet and diagnostic.severity is Severity.NOTE and diagnostic.code in _REPEATED):
             yield diagnostic
@@ -198,7 +198,7 @@ def _is_terminal(handle: int) -> bool:
 
 
 def wants_color(color: Color, file: Path | None) -> bool:
-    """Whether a text for standard output, or for a file, is coloured.
+    """Tell whether a text for standard output, or for a file, is coloured.
 
     Source: no-color.org for `NO_COLOR`; `--color` wins over it.
     """
@@ -209,7 +209,7 @@ def wants_color(color: Color, file: Path | None) -> bool:
 
 
 def summary(report: Report) -> Iterator[Row]:
-    """What backs each table's verdict, then the counts."""
+    """Yield the backing of each table's verdict, then the counts."""
     names = max((width(escape(table.table)) for table in report.tables), default=0)
     words = max((9, *(len(table.verdict.value) for table in report.tables)))
     for file, tables in groupby(report.tables, key=lambda table: table.file):
@@ -230,7 +230,7 @@ def summary(report: Report) -> Iterator[Row]:
 
 
 def backing(table: TableReport) -> str:
-    """`15 lines, by boxes, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
+    """Return the backing in words: `15 lines, by boxes, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
     parts = [f"{table.lines} line{'' if table.lines == 1 else 's'}"]
     if table.method:
         parts.append(f"by {_METHODS.get(table.method, table.method)}")
@@ -255,7 +255,7 @@ def backing(table: TableReport) -> str:
 
 
 def _assumed(table: TableReport) -> Iterator[str]:
-    """Each assumption with its state."""
+    """Yield each assumption with its state."""
     together = table.together
     remarks = (
         {} if together is None else dict.fromkeys(together.not_proved, ", not proved of the levels together")
@@ -270,7 +270,7 @@ def _assumed(table: TableReport) -> Iterator[str]:
 
 
 def _together(known: InSystem) -> Iterator[str]:
-    """What the levels together make of a table."""
+    """Yield the verdicts of the levels together on a table."""
     system = escape(known.system)
     if known.proved:
         yield f"kept by the levels together, {system}{escape(trusting(known.trusts))}"
@@ -325,7 +325,7 @@ class Progress:
         self._width = 0
 
     def __call__(self, doing: str) -> None:
-        """Say what is being done now; an empty text clears the line."""
+        """Show the work under way; an empty text clears the line."""
         if not self.shown:
             return
         text = escape(doing)[:100]

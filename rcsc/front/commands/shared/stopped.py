@@ -29,7 +29,7 @@ class Stopped(click.ClickException):  # what happened
         self.code, self.helps = code, helps
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
-        """The error, as every other is shown."""
+        """Print the error in the form of all others."""
         for line in self.message.splitlines():
             click.echo(f"error[{self.code.value}]: {line}", err=True)
         for text in self.helps:
@@ -44,7 +44,7 @@ class StoppedByFile(Stopped):
         self.diagnostics, self.sources = error.diagnostics, error.sources
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
-        """Each fault, with the line it stands in."""
+        """Print each error, with its line in the file."""
         for diagnostic in self.diagnostics:
             click.echo(plain(full(diagnostic, self.sources)), err=True)
 
@@ -66,10 +66,10 @@ class Ending:
 
     @contextlib.contextmanager
     def inside(self) -> Iterator[None]:
-        """Hear them in here; nowhere but in the main thread.
+        """Handle the signals inside; nowhere but in the main thread.
 
         Raises:
-            KeyboardInterrupt: One of them came.
+            KeyboardInterrupt: A signal came.
         """
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -104,7 +104,7 @@ class Ending:
 
 
 def stopped(error: CodedError) -> Stopped:
-    """The end of a command that met the error."""
+    """Return the end of a command that met the error."""
     from rcsc.base.host.described import BadFile  # keep lazy: most commands end well
 
     if isinstance(error, BadFile) and error.diagnostics:

@@ -44,10 +44,10 @@ class NoSystem(CodedError):  # noqa: N818  # what happened, not an error of ours
 
 
 def system_path(given: Path | None) -> Path:
-    """The description that is meant.
+    """Find the description of a system.
 
     Raises:
-        NoSystem: There is none.
+        NoSystem: There is no description.
     """
     if given is not None and not given.is_dir():
         return given
@@ -61,7 +61,7 @@ def system_path(given: Path | None) -> Path:
 
 
 def meant(target: str | None, system: Path | None, script: str | None) -> tuple[Path, str]:
-    """The description and the script that an argument and two options mean; the script may be none.
+    """Find the description and the script that an argument and two options name; the script may be empty.
 
     Args:
         target: A folder or a file of a system, a script, or a script's name; None for the system that is here.
@@ -69,7 +69,7 @@ def meant(target: str | None, system: Path | None, script: str | None) -> tuple[
         script: What `--script` says.
 
     Raises:
-        NoSystem: There is none.
+        NoSystem: There is no description.
         click.UsageError: There is no such file or folder, or script or system are named twice.
     """
     if target is not None and _is_system(Path(target), folder=target.endswith("/")):
@@ -86,7 +86,7 @@ def meant(target: str | None, system: Path | None, script: str | None) -> tuple[
 
 
 def tables_meant(target: str | None, logs: Sequence[Path] = ()) -> Path | None:
-    """Where the description would be of tables that are meant, or of logs; None where a system is meant, or nothing that is there.
+    """Return the path that the description of these tables or logs would have; None where a system is named, or nothing that exists.
 
     Args:
         target: A file of tables, or a folder of them that has no description; None for this folder, where tables stand in it.
@@ -107,7 +107,7 @@ def tables_meant(target: str | None, logs: Sequence[Path] = ()) -> Path | None:
 
 
 def _files_of(system: Path) -> set[Path]:
-    """Every file of the programs that a system runs; none where it is not in order."""
+    """Return every file of the programs that a system runs; none where its description is invalid."""
     from rcsc.driver.compile import tables_in
     from rcsc.lang.project import load
     from rcsc.run.description import BadDescription
@@ -124,10 +124,10 @@ def _described(folder: Path) -> bool:
 
 
 def _is_system(path: Path, *, folder: bool) -> bool:
-    """Whether a path is a system's; a script may be called as a folder that is none.
+    """Tell whether a path is a system's; a script may have the name of a folder that is none.
 
     Raises:
-        click.UsageError: It must be one, and is not there.
+        click.UsageError: The path must be a system, and does not exist.
     """
     if path.is_dir():
         described = _described(path)
@@ -142,10 +142,10 @@ def _is_system(path: Path, *, folder: bool) -> bool:
 
 
 def _with_script(path: Path, name: str) -> tuple[Path, str]:
-    """A description and a script of it, which must be there.
+    """Return a description and a script of it, which must exist.
 
     Raises:
-        click.UsageError: It is not.
+        click.UsageError: There is no such script.
     """
     from rcsc.run.orders.script import script_path  # most commands read no script
 
@@ -162,7 +162,7 @@ def _with_script(path: Path, name: str) -> tuple[Path, str]:
 
 
 def _is_script(path: Path) -> bool:
-    """Whether a TOML file has rows; one that cannot be read is told by who reads it."""
+    """Tell whether a TOML file has rows; one that cannot be read is reported where it is read."""
     try:
         return "row" in toml_of(text(path, MOST_TOML_BYTES))
     except (OSError, Malformed):
@@ -170,7 +170,7 @@ def _is_script(path: Path) -> bool:
 
 
 def made(path: Path, *, compiles: bool, quiet: bool) -> bool:
-    """Have a system's executors be what its tables give, or say that nobody looked; return whether they may run.
+    """Update a system's executors from its tables, or report that nobody looked; return whether they may run.
 
     Args:
         path: Of the description.
@@ -191,7 +191,7 @@ def made(path: Path, *, compiles: bool, quiet: bool) -> bool:
 
 
 def fresh(path: Path) -> bool:
-    """Hold a system's executors against its tables, and show what differs; return whether nothing does."""
+    """Compare a system's executors with its tables, and show the differences; return whether there are none."""
     from rcsc.driver.compile import compile_system  # only here: what is known already is printed without
 
     report = compile_system(path, only_check=True).report
@@ -201,7 +201,7 @@ def fresh(path: Path) -> bool:
 
 
 def as_they_lie(generated: Path) -> None:
-    """Say that executors are held against no tables."""
+    """Report that executors are not compared with any tables."""
     click.echo(
         f"note: the executors in `{generated}` run as they lie there, held against no tables", err=True
     )

@@ -122,7 +122,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
 @dataclass(frozen=True, slots=True)
 class CampaignOptions:
-    """What the user asked for.
+    """The user's options.
 
     Attributes:
         again: What to type to see an episode again; its file is to be added.
@@ -139,7 +139,7 @@ class CampaignOptions:
 
 
 def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit_s: float) -> Rig[Any]:
-    """What is played on.
+    """Return the rig on which episodes are played.
 
     Raises:
         BadDescription, BadPlant: The system is not in order, or has no such plant.
@@ -158,7 +158,7 @@ def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit
 
 
 def _claims(rig: Rig[Any], *, wanted: bool, compiles: bool) -> Claims:
-    """What was proved of the levels, as far as episodes of this kind watch it."""
+    """Return the proved claims about the levels, as far as episodes of this kind watch them."""
     if not wanted:
         return Claims(why="--no-claims leaves them out")
     if not compiles:
@@ -213,7 +213,7 @@ def _campaign(  # as many as there are options
 
 
 class _EpisodeProgress:
-    """Progress, now and then on standard error."""
+    """Shows progress, now and then, on standard error."""
 
     def __init__(self, wanted: int, known: list[EpisodeRecord]) -> None:
         self._wanted, self._known, self._done = wanted, len(known), len(known)
@@ -285,7 +285,7 @@ def _sum_up(asked: CampaignOptions, records: list[EpisodeRecord], progress: _Epi
 
 
 def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool: WorkerPool) -> None:
-    """Shrink and save what is not saved already, and say what to type."""
+    """Shrink and save what is not saved already, and print the commands to see it again."""
     rig, folder = asked.rig, asked.folder
     chosen = choices(records)
     wanted = [choice for choice in chosen[:MOST] if not is_saved(folder, rig, seed, choice)]
@@ -310,7 +310,7 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
 
 
 def _show(asked: CampaignOptions, index: int, counterexample: Shrunk[Any], place: Path) -> None:
-    """Say what a counterexample shows, and what to type to see it again."""
+    """Print a counterexample's finding, and the command to see it again."""
     finding, happens = counterexample.finding, asked.rig.kind.told(counterexample.episode)
     _tell(f"episode {index}", finding, happens)
     if counterexample.log:
@@ -319,7 +319,7 @@ def _show(asked: CampaignOptions, index: int, counterexample: Shrunk[Any], place
 
 
 def _tell(where: str, finding: EpisodeFinding, happens: Sequence[str]) -> None:
-    """Say what does not hold, and what happens in the episode that shows it."""
+    """Print what does not hold, and the events of the episode that shows it."""
     click.echo(
         f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {finding.tick}: `{finding.property}` does not hold: {finding.message}",
         err=True,

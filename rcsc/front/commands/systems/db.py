@@ -62,7 +62,7 @@ def check(system: Path | None, output: Output) -> int:
 
 
 def _report(error: CodedError | None) -> Report:
-    """What is wrong, for a form that a program reads."""
+    """Return the errors as a report, for a form that a program reads."""
     if error is None:
         return Report(())
     if isinstance(error, BadFile) and error.diagnostics:

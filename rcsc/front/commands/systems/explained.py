@@ -31,7 +31,7 @@ _HARD = "\ue000"
 def say_explanation(
     systems: Mapping[str, TransitionSystem], explanation: Explanation, cycles: int, further: int
 ) -> None:
-    """Say what is not proved; runs of up to `cycles` cycles were searched, and followed on for up to `further`."""
+    """Print an unproved claim; runs of up to `cycles` cycles were searched, and followed on for up to `further`."""
     where = f"level `{explanation.level}`" + (
         f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
     )
@@ -84,14 +84,14 @@ def say_explanation(
 
 
 def _no_run(ts: TransitionSystem, explanation: Explanation, cycles: int) -> str:
-    """Say that no run was found, and where none was looked for."""
+    """Report that no run was found, or that none was looked for."""
     among = " among those in which no input is refused" if ts.refusable else ""
     gave_up = "; the solver gave up on some" if explanation.gave_up else ""
     return f"no run of {cycles} cycles or fewer was found{among}{gave_up}"
 
 
 def _say_logs(explanation: Explanation) -> None:
-    """Say where the runs are kept, if they are."""
+    """Print where the runs are kept, if they are."""
     log = explanation.log
     if log is None:
         return
@@ -117,7 +117,7 @@ def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -
 
 
 def _say_notes(explanation: Explanation, cycles: int) -> None:
-    """Say what is known without a run."""
+    """Print what is known without a run."""
     for note in explanation.notes:
         click.echo(f"  = note: {note}", err=True)
     if explanation.notes and explanation.warns:
@@ -174,7 +174,7 @@ def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanat
 def _say_consequences(
     systems: Mapping[str, TransitionSystem], explanation: Explanation, further: int
 ) -> None:
-    """Print what follows, each with its run: only what comes after the finding's own where it begins as that does."""
+    """Print the consequences, each with its run: only what comes after the finding's own where it begins as that does."""
     ts = systems[explanation.level]
     alike: Counter[tuple[object, ...]] = Counter()
     for number, then in enumerate(explanation.follows or (), 1):
@@ -218,7 +218,7 @@ def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
 
 
 def _time_line(shown: Sequence[TimeLineRow]) -> Table:
-    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
+    """Return a table with a row a cycle: the line that matched, the inputs and other values that changed, and what went wrong."""
     several = len({row.level for row in shown}) > 1
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
@@ -235,12 +235,12 @@ def _time_line(shown: Sequence[TimeLineRow]) -> Table:
 
 
 def _unbroken(text: str) -> str:
-    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
+    """Keep a text on one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
     return text.replace(" ", _HARD) if len(text) <= _LONG else text
 
 
 def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
-    """Return what is not proved, its run, and what follows it, as JSON."""
+    """Return an unproved claim, its run and its consequences, as JSON."""
     finding = explanation.finding
     return {
         "level": explanation.level,

@@ -90,7 +90,7 @@ def command(  # noqa: PLR0913  # as many as there are options
 
 
 def _changed(file: Path, log: Log) -> int:
-    """What is no longer as it was recorded; a log that a kill has cut is read as far as it goes."""
+    """Report a log that differs from its recording; one that a kill has cut is read as far as it goes."""
     if log.checked.seal is not Seal.CHANGED:
         return 0
     return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {log.checked.text}")
@@ -106,7 +106,7 @@ def _check_plot(plot: str | None, against: str | None, output: Path | None) -> N
 
 
 def _exported(log: Log, csv: Path | None, json_: Path | None, parquet: Path | None) -> list[Path]:
-    """Write what was asked for; return the paths."""
+    """Write the files asked for; return the paths."""
     written = []
     for path, text in ((csv, export.csv_text), (json_, export.json_text)):
         if path is not None:
@@ -138,7 +138,7 @@ def _report(path: Path, log: Log, system: Path | None) -> None:
 
 
 def _displays(log: Log, system: Path | None) -> Mapping[str, Sequence[str]]:
-    """What the system shows, where it is there and the log is of it; it may have no cell."""
+    """Return the displays of the system, where it is here and the log is of it; it may have no cell."""
     with contextlib.suppress(NoSystem, BadDescription):
         described = description(system_path(system))
         if log.is_of(described):
@@ -168,7 +168,7 @@ def _summary(log: Log) -> None:
 
 
 def _summed(level: LoggedLevel) -> None:
-    """How many cycles, how they ended, and how often the level was started again."""
+    """Print how many cycles a level had, the last fault, and how often the level was started again."""
     values = level.track.layout.unpack(level.track.packed[-1])
     said = (form(level.sign, level.level, values) for form in (fault_in_words, witness_in_words))
     fault = "; ".join(filter(None, said))

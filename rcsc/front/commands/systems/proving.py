@@ -60,7 +60,7 @@ _WORTH_PROCESSES = 40
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What `rcsc prove` is asked: its options, as they are called there.
+    """The options of `rcsc prove`, by their names there.
 
     Attributes:
         variants: Rules that are off.
@@ -84,7 +84,7 @@ class Asked:
 
 
 def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) -> int:
-    """Prove the levels of a system, say what was found, and return the exit status.
+    """Prove the levels of a system, print the findings, and return the exit status.
 
     Under the key is kept what is to be printed where nothing has changed, if all is proved.
     """
@@ -128,7 +128,7 @@ def _say(lines: Iterable[str]) -> None:
 
 
 def _recalled(proof: SystemProof) -> SystemProof:
-    """Return the proof as one of which nothing had to be proved."""
+    """Return the proof as one that was wholly recalled."""
     return replace(proof, levels=tuple(replace(level, cached=True) for level in proof.levels), seconds=0.0)
 
 
@@ -139,7 +139,7 @@ def _lines(
     asked: Asked,
     explanations: Sequence[Explanation] = (),
 ) -> Iterator[str]:
-    """Yield what is printed of a proof; explanations are part of it as JSON, and else printed by themselves."""
+    """Yield the lines to print of a proof; explanations are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
         yield json.dumps(_as_json(proof, systems, explanations), indent=2)
         return
@@ -154,7 +154,7 @@ def _lines(
 
 
 def _jobs(levels: Iterable[TransitionSystem]) -> int:
-    """How many levels to prove at once where nobody says."""
+    """Return how many levels to prove at once by default."""
     return cores() if sum(map(lines_in, levels)) >= _WORTH_PROCESSES else 1
 
 
@@ -186,7 +186,7 @@ class _LevelProgress:
 
 
 def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
-    """List the questions that cvc5 does not answer as Z3 did, and say how many there were."""
+    """List the questions that cvc5 does not answer as Z3 did, and print how many there were."""
     refused = []
     for level in proof.levels:
         answers = confirmed(systems[level.level], level)
@@ -205,7 +205,7 @@ def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet:
 
 
 def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> Iterator[str]:
-    """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
+    """Yield the lines of one level: its assumptions first, then its other obligations, each with the unproved claims it rests on."""
     declared = {str(assumption.name): assumption.standing.value for assumption in ts.program.assumptions}
     found_before = ", by an earlier run" if proof.cached else ""
     yield click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}"
@@ -273,7 +273,7 @@ def _whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> Iterator
 
 
 def _unconnected(systems: Mapping[str, TransitionSystem], system: Description) -> Iterator[str]:
-    """Which inputs nothing fills, and which outputs nothing takes: perhaps a buffer was forgotten."""
+    """Yield the inputs that nothing fills, and the outputs that nothing takes: perhaps a buffer was forgotten."""
     named = {
         kind: [
             f"{name}.{declared.name}"
@@ -305,7 +305,7 @@ def _agreements(proof: SystemProof) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Keep:
-    """Where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
+    """The places where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
 
     system: Path
     logs: Path | None
@@ -315,7 +315,7 @@ class _Keep:
 
 @dataclass(frozen=True, slots=True)
 class _Search:
-    """Runs that are searched: of how many cycles, followed on for how many, and with which initial values."""
+    """The search for runs: of how many cycles, followed on for how many, and with which initial values."""
 
     cycles: int
     further: int
@@ -338,7 +338,7 @@ def _explanations(
     *,
     quiet: bool,
 ) -> list[Explanation]:
-    """What is not proved, each with its shortest trace where there is one."""
+    """Explain each unproved claim, with its shortest trace where there is one."""
     settings = TraceSettings(
         description(keep.system),
         search.cycles,

@@ -80,7 +80,7 @@ def command(
 
 
 def _executors_of(log: Log, file: Path, system: Path | None) -> Path | None:
-    """Return the generated folder of the log's system; None where it is not what its tables give, which is shown."""
+    """Return the generated folder of the log's system; None where it differs from what its tables give, which is shown."""
     path = _system_of(log, file) if system is None else system_path(system)
     if path is None:
         as_they_lie(Path("generated"))
@@ -99,7 +99,7 @@ def _system_of(log: Log, file: Path) -> Path | None:
 
 
 def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:
-    """The tick that is asked for; None for all, 0 for one that there is not."""
+    """Return the tick to show; None for all, 0 where no tick fits."""
     if at is not None and at not in log.ticks:
         raise click.BadParameter(f"the log holds cycles {log.first + 1} to {log.last}", param_hint="--at")
     return at if find_ is None else find(log, predicate(find_, log.levels), at) or 0
@@ -138,7 +138,7 @@ def _differs(file: Path, again: Replay, moment: ReplayMoment) -> int:
 
 
 def _leading(cycle: ReplayedCycle) -> Any:
-    """The difference that is named: a leaf's, where there is one."""
+    """Return the difference to name: a leaf's, where there is one."""
     return next(
         (difference for difference in cycle.differences if difference.name not in TRACED),
         cycle.differences[0],

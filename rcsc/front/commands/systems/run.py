@@ -45,7 +45,7 @@ WATCHED_RATE = 4.0
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """What the user asked for.
+    """The user's options.
 
     Attributes:
         title: As the user called it.
@@ -172,7 +172,7 @@ def _command(
     executor: str,
     plant: str | None,
 ) -> str:
-    """What to type for the same run; how it begins is to be added."""
+    """Return the command for the same run; its first row is to be added."""
     words = ["rcsc", "run", *([target] if target else [])]
     words += ["--system", str(system)] if system else []
     words += ["--script", script] if script else []
@@ -183,7 +183,7 @@ def _command(
 
 
 def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
-    """The run itself, in this process.
+    """Run the system in this process.
 
     Raises:
         CodedError: Something is not in order, and nothing has moved; or a row was not done.
@@ -214,7 +214,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
 
 
 def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, resumes: bool) -> None:
-    """Puts the run where it is to begin.
+    """Put the run where it is to begin.
 
     Raises:
         BadScript: There is no such row.
@@ -247,7 +247,7 @@ def _check_row(run: ScriptedRun, from_row: int | None) -> None:
 
 @contextlib.contextmanager
 def _recorded(run: ScriptedRun, asked: RunOptions, ending: Ending) -> Iterator[Path]:
-    """Writes the log, cycle by whole cycle; its path."""
+    """Write the log, cycle by whole cycle; yield its path."""
     from rcsc.run.log.recorder import (
         Recorder,  # of an extra; a plant that needs a larger one has said so by now
     )
@@ -278,7 +278,7 @@ class _Pace:
 
 
 def _watch(run: ScriptedRun, asked: RunOptions) -> float:
-    """Runs to the end, and says what becomes of each row; the seconds that it took."""
+    """Run to the end, and print the result of each row; return the seconds taken."""
     begun = time.perf_counter()
     for result in run.steps(asked.most or (UNORDERED_TICKS if run.operator is None else MOST_TICKS)):
         if not asked.quiet:
@@ -287,7 +287,7 @@ def _watch(run: ScriptedRun, asked: RunOptions) -> float:
 
 
 def _interrupted(run: ScriptedRun, log: Path) -> Interrupted:
-    """The end of a run whose plant, extern procedure or script the user waited for no longer, or that was long enough."""
+    """Return the end of a run that the user interrupted, as its plant, extern procedure or script took too long, or it was enough."""
     done = run.system.tick
     message = f"interrupted in cycle {done + 1}; the log holds the {done - run.first_tick} before it"
     return Interrupted(Code.SCRIPT_STOPPED, message, f"`rcsc log {shlex.quote(str(log))}` shows them")
@@ -303,7 +303,7 @@ def _say(number: int, text: str, state: str, reason: str, ticks: int) -> None:
 
 
 def _apart(asked: RunOptions, from_row: int | None) -> int:
-    """The same with a process for each level."""
+    """Run the system with a process for each level."""
     system = description(asked.path)
     rows = _checked_apart(asked, system, signatures(system), from_row)
     with scratch("run") as folder:
@@ -323,7 +323,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
 def _checked_apart(
     asked: RunOptions, system: Description, signs: dict[str, Signature], from_row: int | None
 ) -> int:
-    """How many rows there are; what is wrong with plant and script is told before a process is begun."""
+    """Return the number of rows; report errors of plant and script before a process is begun."""
     stage: Staged = staged(asked.order, system, signs)
     if stage.operator is None:
         raise Stopped(
@@ -338,7 +338,7 @@ def _checked_apart(
 
 
 def _rows_apart(asked: RunOptions, system: Description, first: int, results: Path) -> list[list[Any]]:
-    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    """Run the processes to the end; return each row's number, text, state, reason and ticks, which travel through `results`."""
     outside = Factory("rcsc.run.plant.staging:outside", (asked.order, str(results), first))
     queries = Factory("rcsc.run.plant.staging:queries", (asked.order,))
     rows: list[list[Any]] = []
@@ -401,7 +401,7 @@ def _closing(
 
 
 def _unconnected(run: ScriptedRun) -> Iterator[str]:
-    """Which inputs nobody filled and which outputs nobody takes: a buffer, a plant or a script that a newcomer forgot."""
+    """Yield the inputs that nobody filled and the outputs that nobody takes: a newcomer may have forgotten a buffer, plant or script."""
     system = run.system.description
     levels = {level.name: level.sign for level in run.system.levels}
     silent = [
@@ -422,7 +422,7 @@ def _named(levels: Mapping[str, Signature], kind: str) -> list[str]:
 
 
 def _figures(run: ScriptedRun, seconds: float) -> str:
-    """How long it took."""
+    """Return the figures of a run: cycles, times, failed assumptions."""
     system = run.system
     ticks = system.tick - run.first_tick
     control_s = ticks * system.description.tick_ms / 1000
@@ -434,7 +434,7 @@ def _figures(run: ScriptedRun, seconds: float) -> str:
 
 
 def _kept(run: ScriptedRun, resume: StoppedRuns | None, asked: RunOptions) -> str:
-    """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
+    """Keep a run that stopped, or forget one that ended; return the advice about it."""
     operator = run.operator
     if operator is None:
         return ""

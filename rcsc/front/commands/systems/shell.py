@@ -81,10 +81,10 @@ def _text(script: Path) -> str:
 
 
 def _lines(written: str | None) -> Iterator[str]:
-    """Give the lines of a script, or those of standard input as they come.
+    """Yield the lines of a script, or those of standard input as they come.
 
     Raises:
-        BadScript: One is none.
+        BadScript: A line is too long or no text.
     """
     try:
         yield from lines_of(standard_input() if written is None else io.BytesIO(written.encode()))
@@ -93,7 +93,7 @@ def _lines(written: str | None) -> Iterator[str]:
 
 
 def _complain(where: str, refused: Refused) -> None:
-    """A refusal, as every error is shown."""
+    """Print a refusal in the form of all errors."""
     first, *rest = str(refused).splitlines() or [""]
     click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)
     for line in rest:

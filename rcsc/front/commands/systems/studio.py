@@ -86,7 +86,7 @@ def serve(
     first: Path | None = None,
     runs_at: float | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C, and say what of it is kept.
+    """Serve the page until Ctrl-C, and print which texts were kept.
 
     Args:
         opening: What is in it.
@@ -120,7 +120,7 @@ def serve(
 
 
 def _drawer(path: Path) -> "Drawer | None":
-    """Who draws the paper's cell; None where the system has none, or the extra `cell` is not installed."""
+    """Return the drawer of the paper's cell; None where the system has none, or the extra `cell` is not installed."""
     if not path.is_file():
         return None
     try:

@@ -67,5 +67,5 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
 
 def _is_given(here: click.Context, name: str) -> bool:
-    """Whether an option stands on the command line."""
+    """Tell whether an option stands on the command line."""
     return here.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE

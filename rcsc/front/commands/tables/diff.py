@@ -103,7 +103,7 @@ def _asked(paths: tuple[str, ...], revision: str | None) -> tuple[Given, Given]:
 def _compared(
     asked: tuple[Given, Given], options: Options, progress: Callable[[str], None], follow: bool
 ) -> Difference | int:
-    """The difference, or the status where a side has errors."""
+    """Return the difference, or the exit status where a side has errors."""
     sides = []
     for given_ in asked:
         progress(f"reading {given_.name}")
@@ -114,7 +114,7 @@ def _compared(
 
 
 def _wrong(sides: list[Side]) -> int:
-    """Show what keeps the sides from being compared."""
+    """Show the errors that keep the sides from being compared."""
     every = dict.fromkeys(diagnostic for side in sides for diagnostic in side.diagnostics)
     sources = {name: source for side in sides for name, source in side.sources.items()}
     show(Report(tuple(every), (), sources), "diff", Output(quiet=True))

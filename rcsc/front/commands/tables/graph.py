@@ -57,7 +57,7 @@ def command(named: str, form: str | None, lines: bool, state: str, out: Path | N
 def _draw_all(
     entries: list[FoundTable], form: str, lines: bool, state: str, out: Path | None, options: Options
 ) -> None:
-    """Draw every table; among several, leave out those without a state, and raise what is wrong at the end."""
+    """Draw every table; among several, leave out those without a state, and raise the errors at the end."""
     wrong: list[Diagnostic] = []
     for entry in entries:
         name = f"{entry.program.name}_{entry.table.name}{'_lines' if lines else ''}{ENDINGS[form]}"
@@ -103,7 +103,7 @@ def _derived(entry: FoundTable, lines: bool, state: str, options: Options) -> De
 
 
 def _draw(entry: FoundTable, form: str, derived: Derived, out: Path | None, options: Options) -> None:
-    """Write one graph; say on standard error what its form does not hold."""
+    """Write one graph; report on standard error what its form cannot hold."""
     if form == "svg":
         written(_drawing(entry, derived), out)
         return
@@ -138,7 +138,7 @@ def _drawing(entry: FoundTable, derived: Derived) -> str:
 
 
 def _read_back(entry: FoundTable, form: str, text: str, options: Options) -> int:
-    """How many questions prove that the written graph says the table."""
+    """Prove that the written graph says the table; return the number of questions."""
     read_table = tabled(FORMS[form].read(text))
     verdict = against(entry.loaded, entry.root, entry.program, entry.table, read_table, options)
     if verdict.diagnostics:

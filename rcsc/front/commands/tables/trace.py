@@ -76,7 +76,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
 
 def _answered(traced: Traced, asked: tuple[str, ...]) -> str:
-    """The answers, one after the other.
+    """Return the answers, one after the other.
 
     Raises:
         click.UsageError: Nobody knows what is asked for.

@@ -25,7 +25,7 @@ BY_HAND = 'write the plant in Python: `[plant] python = "plant.py"`'
 
 @dataclass(frozen=True, slots=True)
 class SensorBinding:
-    """What a leaf from outside is filled with.
+    """The source of a leaf from outside.
 
     Attributes:
         end: The field.
@@ -44,7 +44,7 @@ class SensorBinding:
     values: tuple[float, ...] = ()
 
     def read(self, readings: Sequence[float]) -> Value:
-        """The leaf's value.
+        """Return the leaf's value.
 
         Raises:
             BadValue: The leaf cannot hold it.
@@ -62,7 +62,7 @@ class SensorBinding:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorBinding:
-    """What a leaf of a level drives.
+    """The actuator that a leaf of a level drives.
 
     Attributes:
         at: Of the control.
@@ -76,13 +76,13 @@ class ActuatorBinding:
     values: tuple[float, ...] = ()
 
     def control(self, value: Value) -> float:
-        """The control of a value."""
+        """Return the control for a value."""
         return self.values[int(value)] if self.link is None else float(self.link.taken(iter((value,))))
 
 
 @dataclass(frozen=True, slots=True)
 class FaultBinding:
-    """What goes wrong while a fault is on: a control stands still, or a field from outside does.
+    """The effect of a fault while it is on: a control stands still, or a field from outside does.
 
     Attributes:
         name: Of the fault.
@@ -112,7 +112,7 @@ class Binder:
     model: Any
 
     def sensors(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[SensorBinding]:
-        """What fills each leaf of a buffer from outside; those that fit."""
+        """Return the bindings of the leaves of a buffer from outside, those that fit."""
         bound = []
         for end, leaf in ends(buffer):
             where = (*self.path, "sensors", end)
@@ -129,7 +129,7 @@ class Binder:
         return bound
 
     def actuators(self, buffer: Buffer, entries: Mapping[str, Mapping[str, Any]]) -> list[ActuatorBinding]:
-        """What each leaf of a level's buffer drives; those that drive something and fit."""
+        """Return the bindings of the leaves of a level's buffer, those that drive something and fit."""
         bound = []
         for place, (end, leaf) in enumerate(ends(buffer)):
             where = (*self.path, "actuators", end)
@@ -150,7 +150,7 @@ class Binder:
     def faults(
         self, entries: Mapping[str, Mapping[str, Any]], filled: Mapping[str, Leaf]
     ) -> list[FaultBinding]:
-        """The faults that fit.
+        """Return the bindings of the faults, those that fit.
 
         Args:
             entries: By name.
@@ -214,7 +214,7 @@ class Binder:
         return None if by is None else SensorBinding(end, at, NumberLink(leaf, False, by))
 
     def _still(self, end: str, leaf: Leaf, value: object, where: KeyPath) -> SensorBinding | None:
-        """A field that holds one value."""
+        """Bind a field that holds one value."""
         link = (
             FlagLink()
             if leaf.c_type == "bool"
@@ -264,7 +264,7 @@ class Binder:
     def _values(
         self, words: Sequence[str], entry: Mapping[str, Any], where: KeyPath
     ) -> tuple[float, ...] | None:
-        """The control, or the reading, of each member."""
+        """Return the control, or the reading, of each member."""
         values = entry.get("values", {})
         for word in values:
             if word not in words:
@@ -285,7 +285,7 @@ class Binder:
     def _check_control(
         self, binding: ActuatorBinding, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath
     ) -> None:
-        """The model would cut a control beyond its range without a word."""
+        """Note controls beyond the range of the model, which would cut them without a word."""
         if not self.model.actuator_ctrllimited[binding.at]:
             return
         edges = binding.values or tuple(binding.control(edge) for edge in (leaf.low or 0, leaf.high or 0))
@@ -305,7 +305,7 @@ class Binder:
     # --- both ---
 
     def _named(self, kind: Any, what: str, name: object, where: KeyPath) -> int | None:
-        """The place of a thing in the model."""
+        """Return the place of a thing in the model."""
         at = int(mujoco.mj_name2id(self.model, kind, str(name)))
         if at >= 0:
             return at
@@ -322,7 +322,7 @@ class Binder:
     def _factor(
         self, leaf: Leaf, entry: Mapping[str, Any], natural: str | None, what: str, where: KeyPath
     ) -> Factor | None:
-        """From the model's unit to the variable's; None where they do not fit."""
+        """Return the factor from the model's unit to the variable's; None where they do not fit."""
         unit = entry.get("unit")
         try:
             if unit is not None and natural is not None and factor(unit, natural) is None:
@@ -352,7 +352,7 @@ class Binder:
         return by
 
     def _scaled(self, leaf: Leaf, entry: Mapping[str, Any], where: KeyPath) -> Factor | None:
-        """A factor that is written: of a variable without a unit only, for any other has one of its own."""
+        """Return a written factor: only for a variable without a unit, for any other has one of its own."""
         if leaf.unit:
             self.page.wrong(
                 (*where, "scale"),
@@ -368,6 +368,6 @@ class Binder:
 
 
 def ends(buffer: Buffer) -> list[tuple[str, Leaf]]:
-    """The far end of each leaf."""
+    """Return each leaf with its far end."""
     variable = buffer.variable.partition(".")[2]
     return [(f"{buffer.end}{leaf.name.removeprefix(variable)}", leaf) for leaf in buffer.leaves]

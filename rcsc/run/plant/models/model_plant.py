@@ -34,7 +34,7 @@ UNSTABLE = (
 
 @dataclass(slots=True)
 class BoundModel:
-    """A model that moves: `rcsc.run.system.Outside`.
+    """A simulated model: `rcsc.run.system.Outside`.
 
     Attributes:
         model: An `MjModel`; `data` its `MjData`.
@@ -57,17 +57,17 @@ class BoundModel:
         return tuple(self.wrong)
 
     def switch(self, fault: str, *, on: bool) -> None:
-        """Switches a fault on or off."""
+        """Switch a fault on or off."""
         self.on = self.on | {fault} if on else self.on - {fault}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "BoundModel":
-        """The model never changes, and what it is bound to neither."""
+        """Copy the data alone: the model and its bindings never change."""
         return BoundModel(
             self.model, copy.copy(self.data), self.steps, self.takes, self.gives, self.wrong, self.on
         )
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
-        """One tick.
+        """Run one tick.
 
         Raises:
             PlantFailed: The model became unstable, or a reading cannot be held.
@@ -91,20 +91,20 @@ class BoundModel:
         }
 
     def space(self) -> ModelSpace:
-        """How the model looks."""
+        """Return the scene of the model."""
         return ModelSpace(self.model, self.data)
 
     def state(self) -> dict[str, Any]:
-        """All that the model's next step is made of, in plain values; which faults are on is none of it."""
+        """Return the state for the model's next step, in plain values, without the faults that are on."""
         held = np.zeros(mujoco.mj_stateSize(self.model, KEPT))
         mujoco.mj_getState(self.model, self.data, held, KEPT)
         return {"state": held.tolist()}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Puts back a state.
+        """Put back a state.
 
         Raises:
-            ValueError: It is none of this model.
+            ValueError: The state is none of this model.
         """
         held = state.get("state")
         size = mujoco.mj_stateSize(self.model, KEPT)
@@ -124,7 +124,7 @@ class BoundModel:
 
 
 def staged(setup: Setup) -> Staged:
-    """What stands outside: the model.
+    """Stage the model as the plant.
 
     Raises:
         BadPlant: The model cannot be read, or does not fit; all that does not is told.
@@ -155,11 +155,11 @@ def staged(setup: Setup) -> Staged:
 
 
 def _quiet(_warning: str) -> None:
-    """What a warning is about is seen in the data after each step."""
+    """Drop a warning: its cause is seen in the data after each step."""
 
 
 def _model(page: Document, setup: Setup) -> Any:
-    """The model.
+    """Load the model.
 
     Raises:
         BadPlant: It cannot be read.
@@ -200,7 +200,7 @@ def _steps(page: Document, setup: Setup, model: Any) -> int:
 
 
 def _view(model: Any) -> View:
-    """From where the whole model is seen."""
+    """Return a view of the whole model."""
     x, y, z = (float(value) for value in model.stat.center)
     far = 1.6 * max(float(model.stat.extent), 0.2)
     return View((x + 0.6 * far, y - far, z + 0.7 * far), (x, y, z), field_deg=44.0)

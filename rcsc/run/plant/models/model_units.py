@@ -40,7 +40,7 @@ OF_JOINT = {
 
 
 def sensed_in(model: Any, sensor: int) -> str | None:
-    """The unit of a sensor; None where its type says none."""
+    """Return the unit of a sensor; None where its type has none."""
     kind = mujoco.mjtSensor(int(model.sensor_type[sensor])).name
     if kind in OF_JOINT:
         return OF_JOINT[kind][_turns(model, int(model.sensor_objid[sensor]))]
@@ -48,7 +48,7 @@ def sensed_in(model: Any, sensor: int) -> str | None:
 
 
 def driven_in(model: Any, actuator: int) -> str | None:
-    """The unit of the control of a position or velocity servo at a joint or a tendon; None of any other actuator."""
+    """Return the unit of the control of a position or velocity servo at a joint or a tendon; None for any other actuator."""
     attached = int(model.actuator_trntype[actuator])
     if attached not in {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_TENDON)}:
         return None

@@ -22,7 +22,7 @@ TOUCH_M = 0.001
 
 @dataclass(frozen=True, slots=True)
 class Faces:
-    """Every face of a scene, and what it belongs to; faces and corners of a solid stand together.
+    """Every face of a scene, and its solid; faces and corners of a solid stand together.
 
     Attributes:
         corners: Shape (corners, 3), in m.
@@ -42,7 +42,7 @@ class Faces:
 
 
 def painted(scene: Faces, eye: Floats, boxes: Floats, shown: Integers) -> list[int]:
-    """The faces to draw, the farthest first.
+    """Return the faces to draw, the farthest first.
 
     Args:
         scene: All faces.
@@ -64,7 +64,7 @@ def painted(scene: Faces, eye: Floats, boxes: Floats, shown: Integers) -> list[i
 
 
 def _solids(scene: Faces, above: Floats, towards: Bools) -> tuple[Bools, Bools]:
-    """Whether one solid is behind another, and whether no plane of a face parts the two; shape (solids, solids)."""
+    """Return whether one solid is behind another, and whether no plane of a face parts the two; shape (solids, solids)."""
     outside = np.minimum.reduceat(above, scene.first_corner, axis=0) >= -TOUCH_M
     covers = np.logical_or.reduceat(outside & towards, scene.first_face, axis=1)
     covered = np.logical_or.reduceat(outside & ~towards, scene.first_face, axis=1)
@@ -75,7 +75,7 @@ def _solids(scene: Faces, above: Floats, towards: Bools) -> tuple[Bools, Bools]:
 
 
 def _faces(above: Floats, faces: Integers) -> Bools:
-    """Whether one face can only be behind another; `above` has the faces' own planes only."""
+    """Return whether one face can only be behind another; `above` has the faces' own planes only."""
     heights = above[faces]
     over = heights.min(axis=1) >= -TOUCH_M
     under = heights.max(axis=1) <= TOUCH_M
@@ -84,14 +84,14 @@ def _faces(above: Floats, faces: Integers) -> Bools:
 
 
 def _meet(boxes: Floats) -> Bools:
-    """Whether the rectangles around two faces overlap."""
+    """Return whether the rectangles around two faces overlap."""
     low, high = boxes[:, None, :2], boxes[None, :, 2:]
     apart = (low >= high).any(axis=2)
     return np.asarray(~(apart | apart.T))
 
 
 def _sorted(first: Bools, far: Floats) -> list[int]:
-    """An order that keeps every pair that is ordered; the farthest of those that may come; a ring is cut at its farthest."""
+    """Return an order that keeps every ordered pair: the farthest of those that may come next; a ring is cut at its farthest."""
     waits = first.sum(axis=0, dtype=np.int64)
     rank = np.where(waits == 0, far, -np.inf)
     left = np.ones(len(far), dtype=np.bool_)

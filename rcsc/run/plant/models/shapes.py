@@ -38,27 +38,27 @@ class Solid:
 
 @lru_cache(maxsize=512)
 def box(x: float, y: float, z: float) -> Solid:
-    """A box of these half sides."""
+    """Return a box of these half sides."""
     corners = np.array(list(product((-x, x), (-y, y), (-z, z))))
     return _shape(corners, _BOX_FACES)
 
 
 @lru_cache(maxsize=512)
 def cylinder(radius: float, half: float) -> Solid:
-    """A cylinder along z, from -half to half."""
+    """Return a cylinder along z, from -half to half."""
     return _rings(((radius, -half), (radius, half)))
 
 
 @lru_cache(maxsize=512)
 def capsule(radius: float, half: float) -> Solid:
-    """A cylinder along z with half balls at its ends; a ball where `half` is 0."""
+    """Return a cylinder along z with half balls at its ends; a ball where `half` is 0."""
     above = [(radius * np.cos(angle), half + radius * np.sin(angle)) for angle in np.radians(_RISE)]
     below = [(wide, -high) for wide, high in reversed(above)]
     return _rings((*below[: None if half > 0.0 else -1], *above))  # a ball has one equator
 
 
 def _rings(rings: tuple[tuple[float, float], ...]) -> Solid:
-    """The solid between rings of such a radius at such a height, from the lowest up."""
+    """Return the solid between rings, each of a radius at a height, from the lowest up."""
     turn = np.arange(SIDES) * (2 * np.pi / SIDES)
     circle = np.stack((np.cos(turn), np.sin(turn)), axis=1)
     corners = np.vstack([np.column_stack((radius * circle, np.full(SIDES, z))) for radius, z in rings])

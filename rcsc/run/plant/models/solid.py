@@ -31,7 +31,7 @@ _FLOOR, _FLOOR_LINE = "#d3d8dc", "#b9c0c6"
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """From where the cell is seen.
+    """The point of view on the cell.
 
     Attributes:
         eye_m: Where the eye is.
@@ -61,17 +61,17 @@ class _Camera:
     middle: tuple[float, float]
 
     def seen(self, points: Floats) -> Floats:
-        """Points as the eye has them: right, up, distance."""
+        """Return points as seen by the eye: right, up, distance."""
         return np.asarray((points - self.eye) @ self.axes.T)
 
     def flat(self, seen: Floats) -> Floats:
-        """Pixels of points that the eye has before it; shape (..., 2)."""
+        """Return the pixels of points before the eye; shape (..., 2)."""
         across = seen[..., :2] / seen[..., 2:] * (self.scale, -self.scale)
         return np.asarray(across + self.middle)
 
 
 def solid(model: Any, data: Any, view: View = OVERVIEW, text: Sequence[str] = ()) -> str:
-    """The picture, as an SVG document.
+    """Draw the model as an SVG document.
 
     Args:
         model: An `MjModel`.
@@ -128,7 +128,7 @@ def _bodies(model: Any, data: Any, camera: _Camera) -> Iterator[str]:
 
 
 def _shape(kind: int, size: list[float]) -> Solid | None:
-    """The solid of a geom; None for what is not drawn."""
+    """Return the solid of a geom; None for one that is not drawn."""
     match mujoco.mjtGeom(kind):
         case mujoco.mjtGeom.mjGEOM_BOX:
             return box(*size)
@@ -214,7 +214,7 @@ def _floors(model: Any, data: Any, camera: _Camera) -> Iterator[str]:
 
 
 def _floor(turn: Floats, at: Floats, half: tuple[float, float], camera: _Camera) -> Iterator[str]:
-    """A plane of such half sides, and its grid."""
+    """Draw a plane of such half sides, and its grid."""
 
     def flat(points: Sequence[tuple[float, float]]) -> str:
         inside = np.array([(x, y, 0.0) for x, y in points])

@@ -25,7 +25,7 @@ _KINDS: dict[int, ShapeKind] = {
 
 
 class ModelSpace:
-    """A model and its data, looked at.
+    """A view of a model and its data.
 
     Args:
         model: An `MjModel`.
@@ -54,7 +54,7 @@ class ModelSpace:
         )
 
     def poses(self) -> list[float]:
-        """Seven numbers a body."""
+        """Return the poses, seven numbers a body."""
         both = np.concatenate((self.data.xpos[self._moving], self.data.xquat[self._moving]), axis=1)
         numbers: list[float] = both.ravel().tolist()
         return numbers
