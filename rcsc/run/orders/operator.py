@@ -176,7 +176,7 @@ class ScriptOperator:
         """Put back a state, and try its row again; numbers go on from those in the buffers.
 
         Raises:
-            ValueError: The state is none of a script.
+            ValueError: The state is none of this script.
         """
         at = state.get("at")
         if type(at) is not int or not 0 <= at < len(self.rows) or len(state) != 1:

@@ -84,7 +84,7 @@ def _lines(written: str | None) -> Iterator[str]:
     """Yield the lines of a script, or those of standard input as they come.
 
     Raises:
-        BadScript: A line is too long or no text.
+        BadScript: A line cannot be read.
     """
     try:
         yield from lines_of(standard_input() if written is None else io.BytesIO(written.encode()))
