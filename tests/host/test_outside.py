@@ -151,12 +151,13 @@ def _word(node: ast.expr) -> str:
 
 READERS = (
     "rcsc/base/host/files/read.py:",
+    "rcsc/code/emit/rendering.py:",
     "rcsc/code/testing/executors/python.py:",
     "rcsc/code/testing/executors/externs.py:",
     "rcsc/lang/syntax/lalr.py:",
 )
-"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, and the tables of the
-grammar come with the compiler."""
+"""Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, marks
+were written by who reads them, and the tables of the grammar come with the compiler."""
 
 
 def test_only_the_bounded_readers_parse_text_from_outside() -> None:
