@@ -141,6 +141,14 @@ def test_arguments_are_values() -> None:
     assert after(text)["n"] == 4
 
 
+def test_an_argument_may_be_about_an_argument() -> None:
+    text = (
+        "state n : int 0 .. 10\nprocedure p(k : int 0 .. 9) { q(k + 1) }\n"
+        "procedure q(k : int 0 .. 10) { n := k }"
+    )
+    assert after(text, "p", 4)["n"] == 5
+
+
 def test_zero_has_one_sign_where_it_is_kept() -> None:
     text = (
         "state x : real -1.0 .. 1.0 = 0.5\nstate y : real -1.0 .. 1.0\nprocedure p { y := -(x - x) x := -y }"

@@ -1,20 +1,22 @@
-"""The emitted C matcher is its table, for all inputs: a complete check a group of variables at a time, for any size.
+"""The emitted C matcher is its table: a check a group of variables at a time, for any size.
 
 In: a program, its emitted C, one of its tables. Out: how many cells were compared, or an input on which the C gives another line.
 
-Why this is complete. The matcher looks up one mask for each group of leaves and joins them by AND; bit k stands for line k, and the
-line follows from the joined mask. From an input that matches line k alone, let the leaves of one group take every combination of
-their classes, and the other leaves stay. Then bit k of each other mask is set, so that the C gives line k exactly where bit k of this
-group's mask is set and no other line matches. So each bit of each mask decides an answer, and every answer is compared with that
-of a second C, which reads the table line by line. It takes a run for each line and each value, and not for each combination of all
-values: three leaves of a thousand values and ten lines take thirty thousand runs, not 10^9.
+Why this is complete, where each condition looks at one variable. The matcher looks up one mask for each group of leaves and joins
+them by AND; bit k stands for line k, and the line follows from the joined mask. From an input that matches line k alone, let the
+leaves of one group take every combination of their classes, and the other leaves stay. Then bit k of each other mask is set, so that
+the C gives line k exactly where bit k of this group's mask is set and no other line matches. So each bit of each mask decides an
+answer, and every answer is compared with that of a second C, which reads the table line by line. It takes a run for each line and
+each value, and not for each combination of all values: three leaves of a thousand values and ten lines take thirty thousand runs,
+not 10^9.
 
 Each leaf also takes its values one by one: all of them where they are few, else the ends of its range and every bound of the table's
 own cells, with both neighbours; between those as many constants as there are bounds cannot make another turn.
 
 The compiled function is asked, as it is; nothing reads its text or the masks that it was made of. Trusted for this: that it joins
 one look-up a group, the groups being those of the plan. Conditions over several variables hold or not as the values that are
-asked for have it: what other values would tell is ESBMC's part. What it costs: lines times the sizes of the variables, in all.
+asked for have it, so that a table that has some is compared as far as inputs tell: the rest is ESBMC's part.
+What it costs: lines times the sizes of the variables, in all.
 """
 
 from array import array

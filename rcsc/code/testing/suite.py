@@ -277,6 +277,7 @@ class Suite:
             sum(1 for u in vectors.unshown if u.condition and u.reason != "not found"),
             checked.cells if checked else 0,
             checked.unmatched if checked else (),
+            checked.truths if checked else 0,
             self.mutants(table),
             self.cortex(number, table),
         )
