@@ -35,14 +35,14 @@ keeps ranges alone: where that is too little, the C says what was proved. `gener
 or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from rcsc.code.emit.c.c99 import c_map, emit_c, outward
+from rcsc.code.emit.c.c99 import emit_c, outward, rendered_c
 from rcsc.code.emit.plan import Plan
-from rcsc.code.emit.python import emit_python, python_map
-from rcsc.code.emit.rendering import Piece
+from rcsc.code.emit.python import emit_python, rendered_python
+from rcsc.code.emit.rendering import Piece, Rendered
 
 __all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted", "source_map"]
 
@@ -53,28 +53,32 @@ class Target:
 
     Attributes:
         title: Its name in messages.
-        emit: Returns the files of a plan, by path below the generated folder.
+        rendered: Returns the files of a plan, by path below the generated folder, each with where its lines come from.
         outward: Yields each name that programs linked together share, with a description.
     """
 
     title: str
-    emit: Callable[[Plan], dict[str, str]]
+    rendered: Callable[[Plan], dict[str, Rendered]]
     outward: Callable[[Plan], Iterable[tuple[str, str]]] = lambda _: ()
 
 
 TARGETS: Mapping[str, Target] = MappingProxyType(
-    {"python": Target("Python", emit_python), "c": Target("C", emit_c, outward)}
+    {"python": Target("Python", rendered_python), "c": Target("C", rendered_c, outward)}
 )
 """By the name that `--target` takes."""
 
 
 def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, str]:
     """Return the files of a plan in these languages, by path below the generated folder."""
-    return {
-        path: text for name in TARGETS if name in targets for path, text in TARGETS[name].emit(plan).items()
-    }
+    return {file: rendered.text for file, rendered in _rendered(plan, targets)}
 
 
 def source_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
     """For each file of a plan where its lines come from, by path below the generated folder; nothing for what is no code."""
-    return c_map(plan) | python_map(plan)
+    return {file: rendered.pieces for file, rendered in _rendered(plan, TARGETS)}
+
+
+def _rendered(plan: Plan, targets: Collection[str]) -> Iterator[tuple[str, Rendered]]:
+    for name, target in TARGETS.items():
+        if name in targets:
+            yield from target.rendered(plan).items()

@@ -17,6 +17,52 @@ from rcsc.lang.model import Action, Expr, LineName, Procedure, Program, Scalar, 
 WORD = 64
 
 
+class Sort(StrEnum):
+    """What an origin is."""
+
+    LINE = "line"
+    TABLE = "table"
+    PROCEDURE = "procedure"
+    ASSUMPTION = "assumption"
+    INVARIANT = "invariant"
+    VARIABLE = "variable"
+    TYPE = "type"
+    LEVEL = "level"
+    SYSTEM = "system"
+    PROGRAM = "program"  # all variables of a program: their initial values, their ranges
+    INFRASTRUCTURE = "infrastructure"
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a piece of generated code comes from.
+
+    Attributes:
+        name: Of a line or a table the table; of infrastructure its reason; else the declaration.
+        line: The line's name; empty for all else.
+    """
+
+    sort: Sort
+    name: str
+    line: str = ""
+
+    @property
+    def words(self) -> str:
+        """The origin as a person says it.
+
+        >>> Origin(Sort.LINE, "acquire", "3").words, Origin(Sort.PROCEDURE, "look").words
+        ('acquire line 3', 'procedure look')
+        """
+        if self.sort is Sort.LINE:
+            return f"{self.name} line {self.line}"
+        return f"{self.sort} {self.name}" if self.sort is not Sort.INFRASTRUCTURE else self.name
+
+
+def infrastructure(reason: str) -> Origin:
+    """Give the origin of what serves no line, with the reason why it is there."""
+    return Origin(Sort.INFRASTRUCTURE, reason)
+
+
 @dataclass(frozen=True, slots=True)
 class Direct:
     """The class of a leaf is its key less `low`; one class a key."""
@@ -210,7 +256,7 @@ class PlanTable:
     stops: tuple[int, ...] = ()
 
     @property
-    def origin(self) -> "Origin":
+    def origin(self) -> Origin:
         """Where code of the whole table comes from."""
         return Origin(Sort.TABLE, self.table.name)
 
@@ -263,52 +309,3 @@ class Plan:
     def mark(self) -> str:
         """The mark of code that is not proved; empty for proved code."""
         return "" if self.proved else UNPROVED
-
-
-# --- where code comes from ---
-
-
-class Sort(StrEnum):
-    """What an origin is."""
-
-    LINE = "line"
-    TABLE = "table"
-    PROCEDURE = "procedure"
-    ASSUMPTION = "assumption"
-    INVARIANT = "invariant"
-    VARIABLE = "variable"
-    TYPE = "type"
-    LEVEL = "level"
-    SYSTEM = "system"
-    PROGRAM = "program"  # all variables of a program: their initial values, their ranges
-    INFRASTRUCTURE = "infrastructure"
-
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Where a piece of generated code comes from.
-
-    Attributes:
-        name: Of a line or a table the table; of infrastructure its reason; else the declaration.
-        line: The line's name; empty for all else.
-    """
-
-    sort: Sort
-    name: str
-    line: str = ""
-
-    @property
-    def words(self) -> str:
-        """The origin as a person says it.
-
-        >>> Origin(Sort.LINE, "acquire", "3").words, Origin(Sort.PROCEDURE, "look").words
-        ('acquire line 3', 'procedure look')
-        """
-        if self.sort is Sort.LINE:
-            return f"{self.name} line {self.line}"
-        return f"{self.sort} {self.name}" if self.sort is not Sort.INFRASTRUCTURE else self.name
-
-
-def infrastructure(reason: str) -> Origin:
-    """Give the origin of what serves no line, with the reason why it is there."""
-    return Origin(Sort.INFRASTRUCTURE, reason)

@@ -54,7 +54,7 @@ from rcsc.code.emit.plan import (
     stated,
     table_position,
 )
-from rcsc.code.emit.rendering import Piece, Rendered, render
+from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.translate import (
     FAULT,
     FAULT_AT,
@@ -83,15 +83,11 @@ MOST_GROUPED = 512
 
 def emit_python(plan: Plan) -> dict[str, str]:
     """The Python module of the plan, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in _rendered(plan).items()}
+    return {file: rendered.text for file, rendered in rendered_python(plan).items()}
 
 
-def python_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
-    """For the module where its lines come from."""
-    return {file: rendered.pieces for file, rendered in _rendered(plan).items()}
-
-
-def _rendered(plan: Plan) -> dict[str, Rendered]:
+def rendered_python(plan: Plan) -> dict[str, Rendered]:
+    """The Python module of the plan, with where its lines come from."""
     maker = _Maker(plan)
     file = f"python/{maker.names.program}.py"
     return {file: render("module.py.jinja", maker.view(), file)}

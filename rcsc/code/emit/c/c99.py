@@ -34,7 +34,7 @@ from rcsc.code.emit.code_tree import Invoke, read
 from rcsc.code.emit.identifiers import comment, failed_type, guard, names_in, types_header
 from rcsc.code.emit.plan import Plan, infrastructure
 from rcsc.code.emit.ranges import at_procedures
-from rcsc.code.emit.rendering import Piece, Rendered, render
+from rcsc.code.emit.rendering import Rendered, render
 
 
 def _view(c: CProgram) -> dict[str, object]:
@@ -84,15 +84,11 @@ def _view(c: CProgram) -> dict[str, object]:
 
 def emit_c(plan: Plan) -> dict[str, str]:
     """The C files of the plan, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in _rendered(plan).items()}
+    return {file: rendered.text for file, rendered in rendered_c(plan).items()}
 
 
-def c_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
-    """For each of the C files where its lines come from."""
-    return {file: rendered.pieces for file, rendered in _rendered(plan).items()}
-
-
-def _rendered(plan: Plan) -> dict[str, Rendered]:
+def rendered_c(plan: Plan) -> dict[str, Rendered]:
+    """The C files of the plan, each with where its lines come from."""
     c = _program(plan)
     view, name = _view(c), c.p
     header, source = f"c/{name}.h", f"c/{name}.c"
