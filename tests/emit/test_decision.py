@@ -13,7 +13,7 @@ from rcsc.code.emit.decision import Cut, decision, depth, ends
 from rcsc.code.emit.lower import lower
 from rcsc.code.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
 from rcsc.code.testing.executors.symbols import symbols_of
-from rcsc.code.testing.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, ProvedProgram, Snapshot, key_bounds, seal_of_proof, value_of_key
 from tests.bench.executors import c_counts
@@ -163,7 +163,7 @@ def test_a_long_ladder_is_given_up_early() -> None:
 
 
 def check(program: Program, files: dict[str, str]) -> Checked | tuple[str, ...]:
-    checked = check_matcher(program, symbols_of(program, files), files, program.tables[0])
+    checked = MatcherCheck(program, symbols_of(program, files), program.tables[0]).of(files)
     assert not isinstance(checked, Absent)
     return checked
 

@@ -9,14 +9,13 @@ from random import Random
 
 import pytest
 
-from rcsc.code.testing import code_mutants as mutants_of_c
 from rcsc.code.testing import suite
 from rcsc.code.testing.code_mutants import Judge, Noticed, code_mutants, source_of, variants
 from rcsc.code.testing.esbmc import EsbmcAnswer, EsbmcVerdict
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.code.testing.figures import SuiteResult
 from rcsc.code.testing.inputs.snapshot import Missing, search_in
-from rcsc.code.testing.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.code.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
 from rcsc.code.testing.suite import SuiteOptions, run_suite
 from rcsc.driver.trials import proofs
@@ -145,7 +144,7 @@ table t{number} {{
     source = next(text for name, text in files.items() if name.endswith(".c"))
     assert ("classes[" in source) == (width == 300)
     for one in program.tables:
-        assert isinstance(check_matcher(program, symbols_of(program, files), files, one), Checked), one.name
+        assert isinstance(MatcherCheck(program, symbols_of(program, files), one).of(files), Checked), one.name
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +198,7 @@ def test_a_fault_in_the_c_that_finds_the_line_is_told_with_an_input(
     begin = files[path].index("_match_t(const ")
     assert old in files[path][begin:]
     changed = files | {path: files[path][:begin] + files[path][begin:].replace(old, new, 1)}
-    told = check_matcher(program, symbols_of(program, files), changed, program.tables[0])
+    told = MatcherCheck(program, symbols_of(program, files), program.tables[0]).of(changed)
     assert isinstance(told, tuple)
     assert told[0].startswith(("at now = ", "the C stops "))
 
@@ -226,7 +225,7 @@ def test_what_nobody_can_decide_is_a_figure_and_no_failure(
 def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = "| line | part || on |\n| a | < 2 || true |\n| b | >= 2 || false |"
     program = program_of(f"input part : int 0 .. 3\noutput on : bool\ntable t {{\n{lines}\n}}\n")
-    monkeypatch.setattr(mutants_of_c, "check_matcher", lambda *_: Checked(0, 0, ()))
+    monkeypatch.setattr(MatcherCheck, "of", lambda *_: Checked(0, 0, ()))
     found = deep(program, emitted(program)).diagnostics
     assert ["calls equal what the tests tell apart" in finding.message for finding in found] == [True]
 

@@ -26,7 +26,7 @@ from rcsc.code.testing.executors.native import COMPILE_S, Native
 from rcsc.code.testing.executors.shim import shim_c
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.executors.targets import ComparedFunction, targets
-from rcsc.code.testing.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.lang.model import Program, Snapshot
 
 RUN_S = 20.0
@@ -243,6 +243,8 @@ class Judge:
 
     Attributes:
         known: By table, inputs that match its lines.
+        checks: By the number of its table, what is asked of a matcher.
+        said: What the check of a matcher said of the mutant that is judged, likewise.
     """
 
     program: Program
@@ -253,6 +255,8 @@ class Judge:
     expected: bytes
     esbmc_s: float
     known: Mapping[str, Sequence[Snapshot]]
+    checks: dict[int, MatcherCheck] = field(default_factory=dict)
+    said: dict[int, Noticed] = field(default_factory=dict)
 
     def source(self) -> str:
         """Path of the emitted C among the files."""
@@ -267,6 +271,7 @@ class Judge:
 
     def judge(self, mutant: CodeMutant) -> Noticed:
         """Who notices the mutant."""
+        self.said.clear()
         checked = self.by_check(mutant) if mutant.change == "mask" else Noticed.UNDECIDED
         if checked is Noticed.MATCHER:
             return checked
@@ -288,12 +293,16 @@ class Judge:
 
     def checked(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
         """What the check of one matcher says; undecided where it is not complete."""
-        table = self.program.tables[target.number]
-        checked = check_matcher(self.program, self.symbols, files, table, self.known.get(table.name, ()))
-        if isinstance(checked, tuple):
-            return Noticed.MATCHER
-        complete = isinstance(checked, Checked) and not checked.truths and not checked.unmatched
-        return Noticed.EQUIVALENT if complete else Noticed.UNDECIDED
+        number, table = target.number, self.program.tables[target.number]
+        if number not in self.checks:
+            known = self.known.get(table.name, ())
+            self.checks[number] = MatcherCheck(self.program, self.symbols, table, known)
+        if number not in self.said:
+            checked = self.checks[number].of(files)
+            complete = isinstance(checked, Checked) and not checked.truths and not checked.unmatched
+            equal = Noticed.EQUIVALENT if complete else Noticed.UNDECIDED
+            self.said[number] = Noticed.MATCHER if isinstance(checked, tuple) else equal
+        return self.said[number]
 
     def by_tests(self, text: str) -> Noticed:
         """Whether the compiler or the tests notice another C file."""

@@ -109,51 +109,8 @@ class Checked:
     unmatched: tuple[str, ...]
 
 
-def check_matcher(
-    program: Program,
-    symbols: Symbols,
-    files: Mapping[str, str],
-    table: Table,
-    known: Sequence[Snapshot] = (),
-) -> Checked | tuple[str, ...] | Absent:
-    """Compares the emitted C matcher of `table` with the table.
-
-    Args:
-        program: The program.
-        symbols: Names in its emitted C.
-        files: The emitted files, text by path.
-        table: One of its tables.
-        known: Inputs that match lines of it; more are drawn.
-    """
-    compiler = c_compiler()
-    if isinstance(compiler, Absent):
-        return compiler
-    check = _Check(program, symbols, table)
-    starts = [check.starts(at, line, known) for at, line in enumerate(table.lines)]
-    groups = next(t for t in lower_by_force(program).tables if t.table.name == table.name).matcher.groups
-    asked = array("q", [sum(map(len, starts))])
-    for words in (*chain(*starts), *(axes for group in groups for axes in check.axes(group))):
-        asked += words
-    with scratch("matcher") as place:
-        others = write_c(files, place)
-        (place / "probe.c").write_text(_probe_c(program, symbols, table), "utf-8")
-        (place / "in.bin").write_bytes(asked.tobytes())
-        compiled = run_command([compiler, *FLAGS, "-o", "probe", "probe.c", *others], place, COMPILE_S)
-        if compiled.status != 0:
-            return ("the probe does not compile", *compiled.err.strip().splitlines())
-        ran = run_command([str(place / "probe"), "in.bin", "out.bin"], place, RUN_S)
-        if ran.status != 0:
-            return ("the C stops on some input, or does not end",)
-        differing = array("q", content(place / "out.bin", MOST_OF_OURS))
-    if differing:
-        return (check.told(differing),)
-    cells = sum(prod(len(probe.masks) for probe in group) for group in groups)
-    unmatched = tuple(str(line.name) for line, some in zip(table.lines, starts, strict=True) if not some)
-    return Checked(cells * (len(starts) - len(unmatched)), len(relational_tests(table)), unmatched)
-
-
 def _probe_c(program: Program, symbols: Symbols, table: Table) -> str:
-    """C that asks both functions for the line of many inputs; see `_Check.axes` for what it reads."""
+    """C that asks both functions for the line of many inputs; see `MatcherCheck.axes` for what it reads."""
     number = program.tables.index(table)
     probe = PROBE.format(
         struct=symbols.struct,
@@ -168,17 +125,57 @@ def _probe_c(program: Program, symbols: Symbols, table: Table) -> str:
 
 
 @dataclass(slots=True)
-class _Check:
-    """What is asked of the matcher of one table."""
+class MatcherCheck:
+    """What is asked of the matcher of one table, found once for all files that it is asked of.
+
+    Attributes:
+        program: The program.
+        symbols: Names in its emitted C.
+        table: One of its tables.
+        known: Inputs that match lines of it; more are drawn.
+    """
 
     program: Program
     symbols: Symbols
     table: Table
+    known: Sequence[Snapshot] = ()
     edges: dict[str, tuple[int, ...]] = field(init=False)
     near: dict[str, tuple[str, ...]] = field(init=False)
+    _asked: bytes = field(init=False)
+    _told: Checked = field(init=False)
 
     def __post_init__(self) -> None:
+        """Finds inputs of each line, and what is asked from there."""
         self.edges, self.near = leaf_edges(self.program), companions(self.program)
+        lines, plan = self.table.lines, lower_by_force(self.program)
+        starts = [self.starts(at, line) for at, line in enumerate(lines)]
+        groups = next(one for one in plan.tables if one.table.name == self.table.name).matcher.groups
+        asked = array("q", [sum(map(len, starts))])
+        for words in (*chain(*starts), *(axes for group in groups for axes in self.axes(group))):
+            asked += words
+        self._asked = asked.tobytes()
+        cells = sum(prod(len(probe.masks) for probe in group) for group in groups)
+        unmatched = tuple(str(line.name) for line, some in zip(lines, starts, strict=True) if not some)
+        truths = len(relational_tests(self.table))
+        self._told = Checked(cells * (len(lines) - len(unmatched)), truths, unmatched)
+
+    def of(self, files: Mapping[str, str]) -> Checked | tuple[str, ...] | Absent:
+        """Compares the matcher in these files, text by path, with the table."""
+        compiler = c_compiler()
+        if isinstance(compiler, Absent):
+            return compiler
+        with scratch("matcher") as place:
+            others = write_c(files, place)
+            (place / "probe.c").write_text(_probe_c(self.program, self.symbols, self.table), "utf-8")
+            (place / "in.bin").write_bytes(self._asked)
+            compiled = run_command([compiler, *FLAGS, "-o", "probe", "probe.c", *others], place, COMPILE_S)
+            if compiled.status != 0:
+                return ("the probe does not compile", *compiled.err.strip().splitlines())
+            ran = run_command([str(place / "probe"), "in.bin", "out.bin"], place, RUN_S)
+            if ran.status != 0:
+                return ("the C stops on some input, or does not end",)
+            differing = array("q", content(place / "out.bin", MOST_OF_OURS))
+        return (self.told(differing),) if differing else self._told
 
     def told(self, row: Sequence[int]) -> str:
         """An input on which the C gives another line than the table, in words."""
@@ -192,12 +189,12 @@ class _Check:
 
     # --- where a line is gone on from ---
 
-    def starts(self, at: int, line: Line, known: Sequence[Snapshot]) -> list["array[int]"]:
+    def starts(self, at: int, line: Line) -> list["array[int]"]:
         """Inputs that match this line alone, as words."""
         most = STARTS if relational_tests(self.table) else 1
         random = Random(at)  # noqa: S311  # repeatable
         drawn = (self.drawn(line, random, calm=number % 2 == 0) for number in range(MOST_DRAWN))
-        alone = (one for one in chain(known, drawn) if self.matches_alone(line, one))
+        alone = (one for one in chain(self.known, drawn) if self.matches_alone(line, one))
         return [
             array("q", [to_word(v.type, one[v.name]) for v in self.program.variables])
             for one in islice(alone, most)

@@ -35,7 +35,7 @@ from rcsc.code.testing.executors.targets import ComparedFunction, is_matcher, ta
 from rcsc.code.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
 from rcsc.code.testing.inputs.snapshot import Solver, search_in
 from rcsc.code.testing.inputs.vectors import Vectors, vectors_of
-from rcsc.code.testing.matcher import Checked, check_matcher
+from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.code.testing.mutants import Caught, Prover, judge_table
 from rcsc.lang.model import Line, Program, Snapshot, Table
 
@@ -191,7 +191,7 @@ class Suite:
     def matcher(self, table: Table) -> Checked | None:
         """The complete check of the matcher, a group of variables at a time."""
         self.options.progress(f"comparing the masks of table {table.name}")
-        checked = check_matcher(self.program, self.symbols, self.files, table, self.known[table.name])
+        checked = MatcherCheck(self.program, self.symbols, table, self.known[table.name]).of(self.files)
         if isinstance(checked, tuple):
             self.differs(f"the C matcher of table `{table.name}` is not the table", table, checked)
             return None
