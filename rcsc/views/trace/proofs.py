@@ -6,18 +6,17 @@ from pathlib import Path
 
 from rcsc.base.diagnostics.report import TableReport
 from rcsc.base.host.cache import Cache, cache_of
-from rcsc.compose.proof.standing import PROPERTY
-from rcsc.compose.proof.standing import KnownVerdict as Standing
+from rcsc.compose.proof.standing import PROPERTY, KnownVerdict
 from rcsc.driver.outline import known
 from rcsc.lang.model import Program
 from rcsc.lang.project import systems_above
 from rcsc.views.trace.matrix import TableProof
 
 _SAID = {
-    Standing.PROVED: "proved of the levels together",
-    Standing.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
-    Standing.CONDITIONAL: "conditional: rests on what is not proved",
-    Standing.NOT_PROVED: "not proved: `rcsc prove` shows the shortest run against it",
+    KnownVerdict.PROVED: "proved of the levels together",
+    KnownVerdict.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
+    KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
+    KnownVerdict.NOT_PROVED: "not proved: `rcsc prove` shows the shortest run against it",
 }
 
 

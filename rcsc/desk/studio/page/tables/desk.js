@@ -17,6 +17,7 @@ export class Desk {
   files = []; // { file, tables, levels }
   file = "";
   doc = null; // as the server told it last
+  conflict = ""; // how the file on disk and the text here differ, in words; empty where nothing has to be decided
   table = ""; // the name of the table that is shown
   condition = null; // { text, of, can, unknown, every } of the filter: names of lines, `of` which they are
   settled = async () => {}; // waits until all that is typed is sent, or cannot be; of the view of the text
