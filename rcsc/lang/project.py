@@ -127,9 +127,15 @@ def systems_above(file: str) -> list[Path]:
 
 
 def used_elsewhere(file: str) -> bool:
-    """Return whether another file of its project may use a file, by the last word of a `use` in its text."""
+    """Return whether another file of its project may use a file, by the last word of a `use` in its text.
+
+    A file without a project is looked for beside itself only: what lies below its folder may be all that a user has.
+    """
     stem, real = os.path.basename(file).removesuffix(".rcs"), os.path.realpath(file)
-    for other in listed((project_root(file),))[:_MOST_FILES]:
+    root = project_root(file)
+    inside = Path(root, PROJECT_FILE).is_file()
+    others = listed((root,)) if inside else tuple(map(str, sorted(Path(root or ".").glob("*.rcs"))))
+    for other in others[:_MOST_FILES]:
         raw = b"" if os.path.realpath(other) == real else _bytes(other)
         text = raw.decode("utf-8-sig", "replace") if isinstance(raw, bytes) else ""
         words = _WORD.finditer(_ASIDE.sub("", text))

@@ -124,3 +124,20 @@ def test_what_another_file_or_the_system_may_read_is_not_told(tmp_path: Path) ->
     system.unlink()
     (tmp_path / "whole.rcs").write_text("use part\ninvariant i : n or not n\n", encoding="utf-8")
     assert "nothing reads" not in check()
+
+
+def test_a_file_without_a_project_is_looked_for_beside_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part, below = tmp_path / "part.rcs", tmp_path / "below"
+    part.write_text("state n : bool" + WORKS.replace("CALLED", ""), encoding="utf-8")
+    below.mkdir()
+    (below / "whole.rcs").write_text("use part\ninvariant i : n or not n\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for named in (str(part), "part.rcs"):
+        assert (
+            "nothing reads state `n`" in CliRunner().invoke(commands, ["check", "--no-cache", named]).output
+        )
+    (below / "whole.rcs").rename(tmp_path / "whole.rcs")
+    for named in (str(part), "part.rcs"):
+        assert "nothing reads" not in CliRunner().invoke(commands, ["check", "--no-cache", named]).output
