@@ -13,6 +13,7 @@ import pytest
 
 from rcsc.base.host.files.names import BadName
 from rcsc.base.host.files.read import CheckedFields, Malformed, json_of
+from rcsc.desk.studio.runs.gaps import Gaps
 from rcsc.front.commands import run
 from rcsc.front.commands.shared.played import with_ticks
 from rcsc.run.adopt import Begun
@@ -26,6 +27,7 @@ from rcsc.run.log.schema import signature_from, signature_text
 from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.signature import Leaf, signature_of
 from rcsc.run.system import System, assemble
+from rcsc.views.pages.log_page import drawn_first
 from rcsc.views.pages.report import page
 from rcsc.views.pages.witness import RunWitness
 from tests.run.test_log import REPO, restarted, system
@@ -109,13 +111,30 @@ class Account:
         return False
 
 
-def followed(running: System, ticks: int, each: Callable[[RunWitness], None]) -> RunWitness:
-    witness = RunWitness(ScriptedRun(running, None), film=True)
-    running.watch.append(witness)
+class Watched:
+    """What nobody has set in a system that runs."""
+
+    def __init__(self, running: System) -> None:
+        self.running, self.gaps = running, Gaps()
+        self.gaps.begin(running)
+        running.watch.append(self.gaps.add)
+
+    @property
+    def now(self) -> dict[str, frozenset[int]]:
+        """The places by level."""
+        names = self.gaps.names[-1]
+        return {
+            level.name: frozenset(map(level.sign.index.__getitem__, names[level.name]))
+            for level in self.running.levels
+            if level.name in names
+        }
+
+
+def followed(running: System, ticks: int, each: Callable[[Watched], None]) -> None:
+    watched = Watched(running)
     for _ in range(ticks):
         running.step()
-        each(witness)
-    return witness
+        each(watched)
 
 
 def test_nothing_is_called_unset_that_was_written_and_what_was_not_is() -> None:
@@ -123,17 +142,17 @@ def test_nothing_is_called_unset_that_was_written_and_what_was_not_is() -> None:
     account = Account(running)
     lasting: dict[str, int] = {}
 
-    def each(witness: RunWitness) -> None:
-        account.check(witness.unset.now, tuple(level.name for level in running.levels))
+    def each(watched: Watched) -> None:
+        account.check(watched.now, tuple(level.name for level in running.levels))
         for level in running.levels:
-            for leaf in (level.sign.leaves[at] for at in witness.unset.now[level.name]):
+            for leaf in (level.sign.leaves[at] for at in watched.now[level.name]):
                 lasting[f"{level.name}.{leaf.name}"] = running.tick
         if running.tick == 1:
             primitive = running.level("primitive").sign.index
             surely = {
                 primitive[name] for name in ("to_robot.plate[0]", "travelled_mm", "from_robot.plate[8]")
             }
-            assert surely <= witness.unset.now["primitive"], "no line can have written them"
+            assert surely <= watched.now["primitive"], "no line can have written them"
 
     followed(running, 130, each)
     assert account.claimed > 1000
@@ -148,7 +167,7 @@ def test_the_log_says_the_same_as_who_watches(tmp_path: Path) -> None:
         seen: list[dict[str, frozenset[int]]] = []
         with Recorder(running, tmp_path / "run.mcap") as recorder:
             running.watch.append(recorder)
-            followed(running, 60, lambda witness, seen=seen: seen.append(dict(witness.unset.now)))  # type: ignore[misc]  # bound at once
+            followed(running, 60, lambda watched, seen=seen: seen.append(watched.now))  # type: ignore[misc]  # bound at once
         assert [dict(now) for now in unset(read(tmp_path / "run.mcap"))] == seen
         assert any(seen[0].values())
 
@@ -234,17 +253,18 @@ def test_exports_and_plots_have_gaps_where_nothing_was_set(tmp_path: Path) -> No
 def test_the_report_has_a_gap_where_nobody_has_set_a_variable(tmp_path: Path) -> None:
     running = system("python")
     running.description = replace(running.description, displays={"pose": (POSE,)})
-    witness = RunWitness(ScriptedRun(running, None), film=True)
-    running.watch.append(witness)
+    watched, witness = Watched(running), RunWitness(ScriptedRun(running, None))
     level = running.level("primitive")
     at, missing = level.sign.index[POSE.partition(".")[2]], list[bool]()
-    running.watch.append(lambda *_: missing.append(at in witness.unset.now.get(level.name, ())))
+    running.watch.append(lambda *_: missing.append(at in watched.now.get(level.name, ())))
     recorder = Recorder(running, tmp_path / "run.mcap")
     running.watch.append(recorder)
     for _ in range(60):
         running.step()
     recorder.close()
-    film = film_of(page(with_ticks(witness.story("pose", 1.0), read(tmp_path / "run.mcap"), witness.drawn)))
+    log = read(tmp_path / "run.mcap")
+    drawn = drawn_first(log, running.description.displays)
+    film = film_of(page(with_ticks(witness.story("pose", 1.0), log, drawn)))
     assert film["shown"] == [POSE]
     unset = [unset_in(film, POSE, tick) for tick in range(61)]
     assert unset == [True, *missing]
@@ -260,8 +280,7 @@ def test_a_log_that_begins_within_a_run_or_does_not_say_has_no_gaps(tmp_path: Pa
         for _ in range(5):
             running.step()
     assert [dict(now) for now in unset(read(tmp_path / "late.mcap"))] == [{}] * 5
-    witness = RunWitness(ScriptedRun(running, None))
-    assert witness.unset.now == {}
+    assert Watched(running).now == {}
     running = system("python")
     for level in running.levels:
         level.sign = replace(level.sign, unset=())
@@ -330,13 +349,12 @@ def solo(tmp_path: Path) -> System:
 
 def gone(running: System, *nears: int) -> Iterator[set[str]]:
     """What is unset after each tick, in which `near` is this."""
-    account, witness = Account(running), RunWitness(ScriptedRun(running, None))
-    running.watch.append(witness)
+    account, watched = Account(running), Watched(running)
     for near in nears:
         running.buffers.publish("there.near", (near,))
         running.step()
-        account.check(witness.unset.now, ("solo",))
-        yield {running.levels[0].sign.leaves[at].name for at in witness.unset.now["solo"]}
+        account.check(watched.now, ("solo",))
+        yield {running.levels[0].sign.leaves[at].name for at in watched.now["solo"]}
 
 
 def test_each_kind_of_writer(solo: System) -> None:

@@ -15,10 +15,12 @@ from rcsc.run.log.ticks import LoggedTick, Order, Reported, TickValue, frames
 from rcsc.views.pages.drawn import DrawnCell
 from rcsc.views.pages.finding_page import about_cell
 from rcsc.views.pages.report import CellPicture, Matched, ReportRow, Story
-from rcsc.views.pages.witness import FRAMES_APART, MOST_SERIES
+from rcsc.views.pages.witness import FRAMES_APART
 
 MOST_PICTURES = 60
 """Pictures of the cell in a page; a long run has them further apart."""
+MOST_SERIES = 8
+"""Curves of a report where the description has no displays."""
 ENDED = ("done", "failed")
 """Statuses that end an order where its program does not declare whom its level serves."""
 
@@ -58,16 +60,21 @@ def story_of(
         str(log.facts["name"]),
         [order.row(number, log.last) for number, order in enumerate(ordered, 1)],
         _pictures(log, cell, ordered),
-        [
-            Matched(table.level, table.table, line, count)
-            for table in coverage(log)
-            for line, count in table.lines.items()
-        ],
+        matched(log),
         tick_ms=log.tick_ms,
         ticks=len(log.ticks),
         recorded=log.checked.text,
         about_cell=about_cell(cell, why_not) if cell is not None or why_not else "",
     )
+
+
+def matched(log: Log) -> list[Matched]:
+    """Return how often each line of each table ran."""
+    return [
+        Matched(table.level, table.table, line, count)
+        for table in coverage(log)
+        for line, count in table.lines.items()
+    ]
 
 
 # --- orders ---
@@ -122,7 +129,7 @@ def _values(fields: tuple[TickValue, ...]) -> str:
 
 
 def drawn_first(log: Log, displays: Mapping[str, Sequence[str]]) -> list[str]:
-    """Which variables have a curve at first: the numbers of the displays, else the first that buffers from outside or to there carry."""
+    """Return the variables with a curve at first: numbers of the displays, else the first numbers that come from outside or go there."""
     known = {name for name, (_, column) in named_columns(log.levels).items() if _is_number(column)}
     shown = [name for names in displays.values() for name in names if name in known]
     return list(dict.fromkeys(shown or list(_outside(log, known))[:MOST_SERIES]))

@@ -89,11 +89,11 @@ class Witness(RunWitness):
 
     timed: Timed = field(kw_only=True)
     database: Database = field(kw_only=True)
+    drawn: Sequence[str] = DRAWN
     margins_deg: tuple[float, ...] = (360.0,) * 6
 
     def __post_init__(self) -> None:
         """Names the pictures; a solid one is drawn where there is physics."""
-        RunWitness.__post_init__(self)
         mechanism = self.plant.mechanism
         pictures = {"stick": lambda: self.figure(self.run.system)}
         if isinstance(mechanism, Physical):
@@ -104,11 +104,6 @@ class Witness(RunWitness):
     def plant(self) -> Plant:
         """The plant."""
         return self.timed.inner
-
-    @property
-    def drawn(self) -> Sequence[str]:
-        """What the report draws."""
-        return DRAWN
 
     def look(self) -> None:
         """Keeps the least distances of the joints from their limits."""

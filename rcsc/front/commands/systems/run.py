@@ -5,7 +5,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -366,9 +366,13 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
 
 def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions, seconds: float) -> None:
     from rcsc.run.log.read import read  # of an extra, which the recorder had
+    from rcsc.views.pages.log_page import drawn_first, matched
 
+    whole = read(log)
+    story = replace(witness.story(asked.title, seconds), matched=matched(whole))
+    drawn = witness.drawn or drawn_first(whole, witness.run.system.description.displays)
     try:
-        report(path, with_ticks(witness.story(asked.title, seconds), read(log), witness.drawn))
+        report(path, with_ticks(story, whole, drawn))
     except OSError as error:
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
 
