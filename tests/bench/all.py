@@ -1,12 +1,10 @@
-"""What a user waits for, in one table: `python -m tests.bench.all [--svg FILE]`; ten minutes on two processors, as many more for the SVG.
+"""What a user waits for, in one table: `python -m tests.bench.all`; ten minutes on two processors.
 
 Each row has its cost here, and in the same run that of something known beside it: an empty Python, Z3 on the same table, nested ifs,
 a scan of all lines. Ratios hold on other machines too, seconds do not. Seconds are of the processor, so that a busy machine prints
 much the same; those of a command are of its whole process and all that it started. `-` is no answer within the limit of a row.
-With `--svg` cost by size is measured, too, and drawn (`drawn`).
 """
 
-import argparse
 import os
 import re
 import resource
@@ -28,7 +26,7 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.decide import prove_table
-from tests.bench import drawn, executors, loop
+from tests.bench import executors, loop
 from tests.bench.made import families
 from tests.bench.made.families import Fault
 from tests.bench.made.peers import PEERS, python_bitset
@@ -278,9 +276,6 @@ def cell(folder: Path) -> Cost:
 
 def main() -> None:
     """Prints the table, row by row as each is measured."""
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--svg", help="where to draw cost by size")
-    given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         for row in commands(Path(scratch)):
             print(row, flush=True)
@@ -293,8 +288,6 @@ def main() -> None:
         ):
             for row in rows:
                 print(row, flush=True)
-    if given.svg:
-        drawn.main([given.svg])
 
 
 if __name__ == "__main__":
