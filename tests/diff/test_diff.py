@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass, replace
 from enum import StrEnum
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from random import Random
 
@@ -612,7 +612,7 @@ WHERE_ASKED = ("assume c monitored : ", "invariant c : ", "property c : ", "defe
 
 @pytest.mark.parametrize("where", WHERE_ASKED)
 def test_a_condition_that_becomes_undefined_changed(where: str) -> None:
-    for pair in product(CONDITIONS, repeat=2):
+    for pair in combinations(CONDITIONS, 2):
         deferred = where.startswith("deferred")
         texts = [
             PARTLY.format(until=f" {where}{one}" if deferred else "", what="" if deferred else where + one)

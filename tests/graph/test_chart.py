@@ -1,9 +1,11 @@
 """Graphs folded and placed: they say the same edges, and no arrow goes through a label, a state, or what is no end of its own."""
 
-from collections.abc import Iterator
+import math
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -37,29 +39,26 @@ def said(graph: StateGraph) -> set[Edge]:
     return {settled(graph, edge) for edge in graph.edges if not edge.default.endswith("unreachable")}
 
 
-def points(curve: tuple[Point, ...]) -> Iterator[Point]:
-    """Points of Bezier curves, so dense that no letter lies between two."""
-    for at in range(0, len(curve) - 3, 3):
-        a, b, c, d = curve[at : at + 4]
-        for step in range(101):
-            t = step / 100
-            parts = ((1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3)
-            yield (
-                sum(part * end[0] for part, end in zip(parts, (a, b, c, d), strict=True)),
-                sum(part * end[1] for part, end in zip(parts, (a, b, c, d), strict=True)),
-            )
+STEPS = np.linspace(0.0, 1.0, 101)[:, np.newaxis]
+SHARES = np.hstack([math.comb(3, at) * (1 - STEPS) ** (3 - at) * STEPS**at for at in range(4)])
+
+
+def points(curve: tuple[Point, ...]) -> npt.NDArray[np.float64]:
+    """Points of Bezier curves, so dense that no letter lies between two; shape (n, 2), in px."""
+    return np.vstack([SHARES @ np.array(curve[at : at + 4]) for at in range(0, len(curve) - 3, 3)])
 
 
 def crossed(placed: Sheet) -> list[tuple[str, str, str]]:
-    """Arrows that go through a label or a box."""
+    """Arrows that go through a label or a box, by more than 1 px."""
     boxes = [*placed.boxes, *placed.headings, *(arrow.label for arrow in placed.arrows if arrow.label)]
-    return [
-        (arrow.source, arrow.target, box.rows[0].whole if box.rows else box.name)
-        for arrow in placed.arrows
-        for curve in arrow.curves
-        for box in boxes
-        if any(box.holds(point, 1.0) for point in points(curve))
-    ]
+    low = np.array([box.corner for box in boxes]) + 1.0
+    high = low + np.array([(box.width_px, box.height_px) for box in boxes]) - 2.0
+    found = []
+    for arrow in placed.arrows:
+        at = np.vstack([points(curve) for curve in arrow.curves])[:, np.newaxis]
+        inside = ((low <= at) & (at <= high)).all(axis=2).any(axis=0)
+        found += [(arrow.source, arrow.target, str(boxes[box])) for box in np.flatnonzero(inside)]
+    return found
 
 
 def overlapping(one: SheetBox, other: SheetBox) -> bool:
