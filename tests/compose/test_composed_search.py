@@ -60,6 +60,7 @@ from tests.support.programs.systems import (
     counting,
     proved_level,
     small_level,
+    small_proof,
     small_system,
     small_text,
 )
@@ -398,10 +399,10 @@ def test_the_longest_way_and_ways_round(pairs: set[tuple[int, int]]) -> None:
 # --- in the context of a small level -------------------------------------------------------
 
 
-def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_path: Path) -> None:
+def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again() -> None:
     endings = {}
     for level in ("upper", "lower"):
-        _, found = proved_level(tmp_path, level)
+        _, found = small_proof(level)
         assert found.context is not None
         assert (found.context.unreached, found.context.repeated, found.context.restless) == ((), (), False)
         endings[level] = {ending.table: (ending.changes, ending.endless) for ending in found.endings}
@@ -516,8 +517,7 @@ def cache(tmp_path: Path) -> Cache:
 
 
 def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache, tmp_path: Path) -> None:
-    upper = transition_systems(SYSTEM)["upper"]
-    proof = prove_level(upper, LITTLE)
+    upper, proof = small_proof("upper")
     assert recall(cache, upper, LITTLE) is None
     keep(cache, upper, LITTLE, proof)
     kept = recall(cache, upper, LITTLE)
@@ -532,12 +532,11 @@ def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache,
     ]
     other = small_text("upper", (DONE, DONE.replace("d_state", "f_state")))
     assert recall(cache, small_level(tmp_path / "other", "upper", upper=other), LITTLE) is None
-    assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
+    assert recall(cache, upper, replace(LITTLE, walks=LITTLE.walks + 1)) is None
 
 
 def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
-    upper = transition_systems(SYSTEM)["upper"]
-    proof = prove_level(upper, LITTLE)
+    upper, proof = small_proof("upper")
     given_up = LevelProof(
         proof.level,
         tuple((obligation, Verdict.UNDECIDED) for obligation, _ in proof.verdicts),
@@ -647,7 +646,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
 # --- after an earlier proof ---------------------------------------------------------------------
 
 CELL = re.compile(r"(?<=\|) *[a-z_]+ *(?=\|)")
-EDITS = 3
+EDITS = 2
 """Drawn versions of a level; some are broken, and some are not."""
 
 
@@ -675,9 +674,9 @@ def with_another_cell(random: Random, folder: Path) -> Iterator[TransitionSystem
 def test_after_one_cell_has_changed_the_same_is_concluded_as_from_nothing(
     tmp_path: Path, cache: Cache
 ) -> None:
-    before = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
+    _, before = small_proof("upper")
     broken = 0
-    for ts in islice(with_another_cell(Random(2), tmp_path), EDITS):  # noqa: S311  # repeatable on purpose
+    for ts in islice(with_another_cell(Random(2), tmp_path), 1, 1 + EDITS):  # noqa: S311  # repeatable on purpose
         keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses), Candidates())
         assert len(candidates(cache, ts).clauses) == len(before.clauses) > 0
         proof = prove_level(ts, LITTLE, cache)
@@ -729,7 +728,7 @@ def test_after_something_else_has_changed_the_same_is_concluded_as_from_nothing(
     edits: Callable[[Random, Path], Iterator[TransitionSystem]], tmp_path: Path, cache: Cache
 ) -> None:
     """An invariant, an assumption or a buffer, in levels of which some are proved and some are not, or none is."""
-    before = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
+    _, before = small_proof("upper")
     broken = 0
     for ts in islice(edits(Random(3), tmp_path), EDITS):  # noqa: S311  # repeatable on purpose
         keep_candidates(cache, ts, FoundInvariant(before.predicates, before.clauses), Candidates())
@@ -775,8 +774,7 @@ def counted() -> Iterator[dict[str, int]]:
 @pytest.mark.parametrize("value", [0, ~0])
 def test_nothing_is_believed_of_candidates(value: int, cache: Cache) -> None:
     """Each forbids a value of one predicate; with all of them no state would be left. Some are about predicates that there are not."""
-    ts = transition_systems(SYSTEM)["upper"]
-    proof = prove_level(ts, LITTLE)
+    ts, proof = small_proof("upper")
     wrong = tuple(((at, value),) for at in range(len(proof.predicates)))
     more = (*proof.predicates, Predicate("gone", Bool()))
     keep_candidates(

@@ -324,6 +324,7 @@ def test_what_was_not_looked_at_is_named(check: Said) -> None:
         renamed = small_text(name).replace("new_command", "fresh")
         Path(f"{name}.rcs").write_text(renamed, encoding="utf-8")
     assert prove() == 0
+    assert prove("--strict") == 1
     said = check()
     missing = "level `upper`: not looked at: a command number is taken up once: there is no state `new_command : bool`"
     assert f"system.toml is proved as far as it was looked at: {missing}; " in said

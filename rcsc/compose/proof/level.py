@@ -122,7 +122,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
     first = _proved_of(refusing, effort, cache)
     stands = first.stands or ts.links.above is None
     looked = first.context is not None and stands and all(ending.proved for ending in first.endings)
-    if looked and not first.open:
+    if not first.open and (looked or not effort.looks):
         return first
     begun = FoundInvariant(first.predicates, first.clauses).named
     without = replace(effort, looks=effort.looks and not looked)

@@ -7,21 +7,35 @@ or a lower level whose table `go` has other lines (`lower_level`).
 
 import re
 import shutil
+from functools import cache
 from pathlib import Path
 
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, prove_level
-from rcsc.compose.proof.system import transition_systems
+from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
 from rcsc.lang.model import Kind
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edited, system, table, without_row
 
 SMALL = Path(__file__).parents[2] / "data" / "composed"
 SYSTEM = SMALL / "system.toml"
-LITTLE = Effort(walks=10, cycles=80)
+LITTLE = Effort(walks=6, cycles=40)
 """Enough to find the invariants of levels as small as these."""
+
+
+@cache
+def small_proofs() -> tuple[dict[str, TransitionSystem], SystemProof]:
+    """Prove the small system as it is, once for all tests of a process."""
+    made = transition_systems(SYSTEM)
+    return made, prove_transition_systems(made, LITTLE, 1, tuple(made))
+
+
+def small_proof(name: str) -> tuple[TransitionSystem, LevelProof]:
+    """Return a level of the small system as it is, and its proof."""
+    made, proof = small_proofs()
+    return made[name], next(level for level in proof.levels if level.level == name)
 
 
 def small_text(name: str, *edits: tuple[str, str]) -> str:
