@@ -208,6 +208,9 @@ def test_the_span_of_a_remainder_has_the_sign_of_what_is_divided_and_is_below_th
     term = Term("mod", (NUMBER, OTHER), INT)
     for one, two in product(SPANS, SPANS):
         found, most = spanned(term, [one, two]), max(abs(two[0]), abs(two[1]), 1) - 1
+        pairs = product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+        assert found is not None
+        assert all(found[0] <= a - b * truncated(a, b) <= found[1] for a, b in pairs if b)
         if one[0] == one[1] and two[0] == two[1]:
             rest = one[0] - two[0] * truncated(one[0], two[0]) if two[0] else 0
             assert found == (rest, rest)
