@@ -35,6 +35,14 @@ def _state(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def kept_proofs(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One cache for all tests of a run that ask for it, whichever worker runs them: what one has proved, the others recall."""
+    mine = tmp_path_factory.getbasetemp()
+    of_all = mine.parent if "PYTEST_XDIST_WORKER" in os.environ else mine
+    monkeypatch.setenv("RCSC_CACHE_DIR", str(of_all / "kept_proofs"))
+
+
 @pytest.fixture(scope="session")
 def repo() -> Path:
     """The checkout's root."""
@@ -82,6 +90,14 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 def _missing(tool: str) -> bool:
     return not any(shutil.which(name) for name in (BROWSERS if tool == "chromium" else (tool,)))
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leaves out, where quick tests alone are asked for, files that have none: most of the time would go into reading them."""
+    if config.getoption("markexpr") != "quick" or not collection_path.match("test_*.py"):
+        return None
+    file = collection_path.relative_to(Path(__file__).parent).as_posix()
+    return True if file not in {name.partition("::")[0] for name in chosen()} else None
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` is asked

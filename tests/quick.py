@@ -1,7 +1,8 @@
 """Which tests are quick: `python -m tests.quick JUNIT` chooses them anew, from what a run of all took (`pytest --junitxml=JUNIT`).
 
 `pytest -m quick` runs them: some of every room, in less than a minute of two idle cores. They are whole files, the least costly first; of
-a room that has no such file, its least costly tests. The list is `quick.txt`; `conftest.py` gives each test on it its mark.
+a room that has no such file, the least costly tests of one: to read a file costs as much as a hundred such tests. The list is `quick.txt`;
+`conftest.py` gives each test on it its mark, and reads no other file where they alone are asked for.
 """
 
 import sys
@@ -11,9 +12,9 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 LIST = Path(__file__).with_name("quick.txt")
-MOST_S = 38.0
+MOST_S = 16.0
 """Processor time that all may take, but for what it takes to find them."""
-MOST_OF_A_ROOM_S = 2.0
+MOST_OF_A_ROOM_S = 0.8
 """Of tests of a room none of whose files is on the list."""
 
 
@@ -28,7 +29,7 @@ def chosen() -> frozenset[str]:
 
 
 def choose(took_s: Mapping[str, float]) -> list[str]:
-    """Choose files, and functions of rooms without one.
+    """Choose files, and of each room without one the functions of the file that has most such.
 
     Args:
         took_s: What each function took, all its cases together, by `ROOM/FILE.py::FUNCTION`.
@@ -43,13 +44,22 @@ def choose(took_s: Mapping[str, float]) -> list[str]:
             break
         found.append(name)
     rooms = {name.split("/")[0] for name in found}
-    left_s: dict[str, float] = defaultdict(lambda: MOST_OF_A_ROOM_S)
-    for name, each_s in sorted(took_s.items(), key=lambda one: (one[1], one[0])):
-        room = name.split("/")[0]
-        if room not in rooms and left_s[room] >= each_s:
-            left_s[room] -= each_s
-            found.append(name)
+    of_room: dict[str, list[str]] = defaultdict(list)
+    for file in files:
+        cheap = _cheap({name: each_s for name, each_s in took_s.items() if name.startswith(f"{file}::")})
+        of_room[file.split("/")[0]] = max(of_room[file.split("/")[0]], cheap, key=len)
+    found += [name for room, cheap in of_room.items() if room not in rooms for name in cheap]
     return sorted(found)
+
+
+def _cheap(took_s: Mapping[str, float]) -> list[str]:
+    """The least costly functions of a file."""
+    found, left_s = [], MOST_OF_A_ROOM_S
+    for name, each_s in sorted(took_s.items(), key=lambda one: (one[1], one[0])):
+        left_s -= each_s
+        if left_s >= 0:
+            found.append(name)
+    return found
 
 
 def measured(junit: Path) -> dict[str, float]:
