@@ -105,12 +105,13 @@ def test_a_path_that_is_not_there_is_raised(function: object, tmp_path: Path) ->
 # --- levels together -----------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("kept_proofs")
 def test_a_proof_says_what_the_command_says(capsys: pytest.CaptureFixture[str]) -> None:
     """Of a system that is right and of one that is not: claims, findings, runs."""
     for system, status in ((SYSTEM, 0), (LAST_ECHO, 1)):
-        assert command(["prove", "--json", "--no-cache", "--trace", "4", str(system)]) == status
+        assert command(["prove", "--json", "--trace", "4", str(system)]) == status
         form = json.loads(capsys.readouterr().out)
-        proof = rcsc.prove(system, cycles=4, cache=False)
+        proof = rcsc.prove(system, cycles=4)
         assert (proof.proved, proof.whole) == (form["proved"], form["whole"])
         claims = [(level["level"], goal) for level in form["levels"] for goal in level["goals"]]
         assert [(one.level, one.what, one.table, one.name, one.verdict) for one in proof.claims] == [

@@ -108,11 +108,11 @@ def foreign(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 COMMANDS = [
     "check .", "compile . --check", "fmt --check .", "graph -o drawn .", "diff system.toml system.toml",
-    "shell", "shell --executor python", "shell --alone --executor python", "shell --script steps.txt --executor python",
-    "run day", "run day --executor python --quiet", "run day --processes", "run day --plant kinematic --report r.html",
+    "shell", "shell --executor python", "shell --script steps.txt --executor python",
+    "run day", "run day --processes", "run day --plant kinematic --report r.html",
     "run day --resume", "run day --from-row 3", "run nothing", "run day --log kept.mcap",
-    "db check", "db check --json", "db build", "db build -o made.sqlite", "db show", "db show places", "db show --database none",
-    "campaign --episodes 1", "campaign --episodes 1 --workers 1", "prove", "prove --level task",
+    "db check", "db build -o made.sqlite", "db show", "db show places", "db show --database none",
+    "campaign --episodes 1 --workers 1", "prove", "prove --level task",
     "prove --log found", "log none.mcap", "replay none.mcap", "certify .",
 ]  # fmt: skip
 STEPS = """help

@@ -81,6 +81,7 @@ def planted(folder: Path) -> Path:
     return mark
 
 
+@pytest.mark.usefixtures("kept_proofs")
 @pytest.mark.parametrize("command", [["check"], ["fmt", "--check"], ["prove"], ["compile", "-q"]])
 def test_a_command_about_tables_imports_nothing_of_their_folder(command: list[str], tmp_path: Path) -> None:
     """In a process of its own, begun in the folder; an extern procedure names a module there, too."""
