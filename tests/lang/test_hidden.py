@@ -1,5 +1,6 @@
 """States that the compiler adds, in two versions of a program: the same where they are fed with the same, whatever they are called."""
 
+from functools import cache
 from itertools import product
 
 import pytest
@@ -46,6 +47,7 @@ ASKED = (
 SAME = {("a.b for 200 [ms]", "a.b = true for 200 [ms]"), ("@T(a.b)", "not was a.b and a.b")}
 
 
+@cache
 def version(condition: str, before: str = "") -> Program:
     first = f"assume before monitored : {before} or true" if before else ""
     return program_of(TEXT.replace("CONDITION", condition).replace("FIRST", first))
@@ -54,7 +56,7 @@ def version(condition: str, before: str = "") -> Program:
 @pytest.mark.parametrize("one", ASKED)
 def test_tables_that_look_back_at_something_else_are_not_the_same(one: str) -> None:
     """`x > 3` for a time and `x >= 4` for it are, too; as their counters are fed with other words, nobody says so."""
-    for other in ASKED:
+    for other in ASKED[ASKED.index(one) :]:
         first, second = version(one), version(other, before="was a_b and (a_b or a.b) for 200 [ms]")
         told = compare((first, first.tables[0]), (second, second.tables[0]), Options())
         alike = one == other or (one, other) in SAME or (other, one) in SAME

@@ -237,8 +237,15 @@ def cases() -> Iterator[Case]:
 
 EMPTY = program_of("input a : bool\n")
 CASES = tuple(cases())
-ROWS = {case: tuple(case.rows()) for case in CASES}
 ids = [f"{case.op or 'in'} {type(case.kind).__name__}{at}" for at, case in enumerate(CASES)]
+
+
+@cache
+def rows_of(case: Case) -> tuple[tuple[tuple[Value, ...], Value], ...]:
+    """As `Case.rows`, once; not where the file is only read."""
+    return tuple(case.rows())
+
+
 over_cases = pytest.mark.parametrize("case", CASES, ids=ids)
 
 
@@ -251,7 +258,7 @@ def same(one: Value, two: Value) -> bool:
 
 def different(case: Case, found: Iterable[Value]) -> list[object]:
     """Rows that the interpreter sees otherwise."""
-    rows = zip(ROWS[case], found, strict=True)
+    rows = zip(rows_of(case), found, strict=True)
     return [(operands, value, other) for (operands, value), other in rows if not same(value, other)]
 
 
@@ -360,13 +367,13 @@ def test_what_no_machine_can_do_is_owed() -> None:
 
 @over_cases
 def test_folding(case: Case) -> None:
-    assert different(case, (fold(case.literals(operands)) for operands, _ in ROWS[case])) == []  # type: ignore[misc]  # none is undefined
+    assert different(case, (fold(case.literals(operands)) for operands, _ in rows_of(case))) == []  # type: ignore[misc]  # none is undefined
 
 
 @over_cases
 def test_symbolic_values_fold_to_the_same(case: Case) -> None:
     """Of finite constants; the sign of a zero cannot be seen in any condition, and is not kept."""
-    for operands, value in ROWS[case]:
+    for operands, value in rows_of(case):
         node = Evaluation({}, {}, {}).evaluate(case.literals(operands))
         finite = isinstance(value, float) and not math.isfinite(value)
         if node.known and not finite and all(map(math.isfinite, operands)):
@@ -428,7 +435,7 @@ def z3_value(found: Any, kind: Scalar) -> Value:
 
 @over_cases
 def test_z3(case: Case) -> None:
-    found = (z3_value(encode(case.literals(operands), Frame({})), case.made) for operands, _ in ROWS[case])
+    found = (z3_value(encode(case.literals(operands), Frame({})), case.made) for operands, _ in rows_of(case))
     assert different(case, found) == []
 
 
@@ -454,7 +461,7 @@ def test_the_checker_of_certificates(case: Case, terms: type[Terms]) -> None:
     """Folded by spans, or computed; the sign of a zero is not kept where it is folded."""
     start = Start(EMPTY)
     start.terms = terms()
-    for operands, value in ROWS[case]:
+    for operands, value in rows_of(case):
         [found] = values_in(in_checker(start, case, operands), {}, 1).tolist()
         assert same(found, value) or (terms is Terms and found == value == 0), operands
 
@@ -465,7 +472,7 @@ def test_cvc5() -> None:
     start.terms = terms = Unfolded()
     asked = []
     for case in CASES:
-        for operands, value in ROWS[case]:
+        for operands, value in rows_of(case):
             found = in_checker(start, case, operands)
             nothing = isinstance(value, float) and math.isnan(value)
             expected = found if nothing else terms.constant(sort_of(case.made), value)
@@ -624,7 +631,7 @@ def test_python(case: Case) -> None:
     spelled = compile(
         IN_PYTHON.code(PyText(names_of(program_of(SMALL))).expr(case.locals())), "expression", "eval"
     )
-    given = (dict(zip(("v_a", "v_b"), operands, strict=False)) for operands, _ in ROWS[case])
+    given = (dict(zip(("v_a", "v_b"), operands, strict=False)) for operands, _ in rows_of(case))
     found = (eval(spelled, python_names(), one) for one in given)  # noqa: S307 - our own text
     assert different(case, found) == []
 
@@ -642,13 +649,13 @@ def c_program() -> str:
             params = ", ".join(f"{types(case.kind)} v_{name}" for name in ("a", "b")[: case.many])
             functions.append(f"static {c_word(case.made)} {who}_{at}({params}) {{ return {body}; }}")
         rows = ", ".join(
-            "{" + ", ".join(c_bits(case.kind, v) for v in operands) + "}" for operands, _ in ROWS[case]
+            "{" + ", ".join(c_bits(case.kind, v) for v in operands) + "}" for operands, _ in rows_of(case)
         )
-        size = f"[{len(ROWS[case])}][{case.many}]"
+        size = f"[{len(rows_of(case))}][{case.many}]"
         given = ", ".join(c_value(case.kind, f"rows_{at}[i][{one}]") for one in range(case.many))
         functions.append(f"static const uint64_t rows_{at}{size} = {{{rows}}};")
         calls.append(
-            f"for (int i = 0; i < {len(ROWS[case])}; i++) {{ show_{c_word(case.made)}(c_{at}({given}), r_{at}({given})); }}"
+            f"for (int i = 0; i < {len(rows_of(case))}; i++) {{ show_{c_word(case.made)}(c_{at}({given}), r_{at}({given})); }}"
         )
     helpers = [
         f"static {function.head} {{\n" + "\n".join(IN_C.lines(function.body)) + "\n}"
@@ -715,7 +722,7 @@ def test_c_and_its_reference(tmp_path: Path) -> None:
     assert built.status == 0, built.err[:3000]
     ran = run_command([str(binary)], tmp_path, 60.0)
     assert ran.status == 0, ran.err
-    rows = [(case, *row) for case in CASES for row in ROWS[case]]
+    rows = [(case, *row) for case in CASES for row in rows_of(case)]
     found = ran.out.splitlines()
     assert len(found) == len(rows) > 3_000
     wrong = [
