@@ -20,7 +20,6 @@ REPO = Path(__file__).parents[2]
 FILES = [
     "examples/grip.rcs",
     "emove/locate.rcs",
-    "task/acquire.rcs",
     "gallery/tcas/tcas.rcs",
     "gallery/rfc9293/published.rcs",
 ]
@@ -133,7 +132,7 @@ def test_keys_survive_any_text(text: str, offset: int) -> None:
     spliced(text, keys.align(text, offset))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_keys_survive_shipped_tables_that_somebody_edits(seed: int) -> None:
     """Rows above the first heading, parts that align to less than they were: most keys are pressed in such texts."""
     random = Random(seed)  # noqa: S311  # edits, no secrets

@@ -20,8 +20,7 @@ from rcsc.proof.table.findings.unread import TOLD
 REPO = Path(__file__).parents[2]
 PUBLISHED = [
     "examples/acquire_published.rcs", "gallery/cia402/commands_published.rcs", "gallery/tcas/published.rcs",
-    "gallery/lads_cover/published.rcs", "gallery/opcua_program/published.rcs", "gallery/lm_fsm/published.rcs",
-    "gallery/elevator/published.rcs", "examples/grip.rcs", "gallery/ros2_lifecycle/published.rcs",
+    "gallery/lm_fsm/published.rcs", "examples/grip.rcs", "gallery/ros2_lifecycle/published.rcs",
 ]  # fmt: skip
 HEAD = (
     "enum mode { off, on, stuck }\ninput now : mode\ninput w : int 0 .. 9\ninput v : int 0 .. 9\n"

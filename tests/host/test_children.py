@@ -3,7 +3,6 @@
 Nothing here is timed. Whatever must end holds a FIFO open; that it has ended is read as the end of that file.
 """
 
-import ast
 import contextlib
 import fcntl
 import itertools
@@ -370,44 +369,3 @@ def test_a_worker_answers_or_is_said_to_have_ended(
             children.answer(pool.submit(divmod, 1, 0))
         with pytest.raises(children.WorkerEndedError):
             children.answer(pool.submit(end, status))
-
-
-# --- one place ---
-
-BEGIN = {"subprocess", "tempfile", "pty", "multiprocessing", "concurrent.futures"}
-"""Modules by which processes begin and temporary things are made."""
-ALLOWED = {
-    ("rcsc/run/processes/block.py", "multiprocessing"),  # shared memory, no process
-    ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
-    ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
-    (
-        "rcsc/run/campaign/worker_pool.py",
-        "concurrent.futures",
-    ),  # the classes of executors and what they raise
-    ("rcsc/run/campaign/runner.py", "concurrent.futures"),
-    ("rcsc/run/campaign/counterexamples.py", "concurrent.futures"),
-    ("rcsc/desk/studio/build.py", "concurrent.futures"),  # what it raises
-    ("rcsc/desk/editor/server/session.py", "concurrent.futures"),  # threads
-}
-
-
-def imported(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
-        names = (
-            [alias.name for alias in node.names] if isinstance(node, ast.Import)
-            else [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        )  # fmt: skip
-        yield from (
-            begin for begin in BEGIN for name in names if name == begin or name.startswith(f"{begin}.")
-        )
-
-
-def test_processes_and_temporary_folders_begin_in_one_place(repo: Path) -> None:
-    found = set()
-    for path in [*(repo / "rcsc").rglob("*.py"), *(repo / "sim").rglob("*.py")]:
-        name = str(path.relative_to(repo))
-        text = path.read_text(encoding="utf-8")
-        found |= {(name, one) for one in imported(ast.parse(text))}
-        words = ("os.fork", "os.spawn", "os.posix_spawn", "os.system", "os.popen", "ProcessPoolExecutor(")
-        assert name == "rcsc/base/host/children.py" or not any(word in text for word in words), name
-    assert {one for one in found if one[0] != "rcsc/base/host/children.py"} <= ALLOWED

@@ -330,7 +330,7 @@ def answered(folder: Path) -> tuple[str, ...]:
     return tuple(finding.message for finding in refused.diagnostics) or (str(refused),)
 
 
-SAMPLE = 80
+SAMPLE = 24
 
 
 @pytest.mark.parametrize("which", [0, 1])

@@ -183,6 +183,47 @@ def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
     return [f"{node.module}.{name.name}" for name in node.names]
 
 
+BEGIN = {"subprocess", "tempfile", "pty", "multiprocessing", "concurrent.futures"}
+"""Modules by which processes begin and temporary things are made."""
+BEGINS = "rcsc/base/host/children.py"
+BEGUN = (
+    "os.fork",
+    "os.spawn",
+    "os.posix_spawn",
+    "os.system",
+    "os.popen",
+    "ProcessPoolExecutor",
+    "futures.ProcessPoolExecutor",
+)
+NO_PROCESS = {
+    ("rcsc/run/processes/block.py", "multiprocessing"),  # shared memory, no process
+    ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
+    ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
+    (
+        "rcsc/run/campaign/worker_pool.py",
+        "concurrent.futures",
+    ),  # the classes of executors and what they raise
+    ("rcsc/run/campaign/runner.py", "concurrent.futures"),
+    ("rcsc/run/campaign/counterexamples.py", "concurrent.futures"),
+    ("rcsc/desk/studio/build.py", "concurrent.futures"),  # what it raises
+    ("rcsc/desk/editor/server/session.py", "concurrent.futures"),  # threads
+}
+
+
+def test_processes_and_temporary_folders_begin_in_one_place() -> None:
+    imports = {
+        (name, begin)
+        for name, nodes in sources()
+        for node in nodes
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for one in _imported(node)
+        for begin in BEGIN
+        if f"{one}.".startswith(f"{begin}.")
+    }
+    assert {one for one in imports if one[0] != BEGINS} <= NO_PROCESS
+    assert [place for place, call in calls() if call.startswith(BEGUN) and not place.startswith(BEGINS)] == []
+
+
 def test_formats_of_bytes_are_named_where_they_are_known() -> None:
     naming = {
         name
