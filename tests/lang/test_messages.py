@@ -1,13 +1,23 @@
-"""What is said where somebody writes as in another language, or puts something right in a wrong place: where, what, and what to write."""
+"""What is told of texts that are right but for a word or an order: where, what, and what to write.
+
+Somebody writes as in another language, or puts something right in a wrong place; a cell reads what an earlier cell of its line wrote; a
+variable starts with what nobody wrote.
+"""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.lang.interpret import initial, run_table
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
 from rcsc.lang.syntax.expected import ELSEWHERE, operator_meant, word_meant
-from tests.support.programs.stages import program_of, refused
+from tests.support.programs.stages import program_of, refused, reported
 from tests.support.programs.texts import table
+
+# --- as in another language, or in a wrong place ---
 
 WHEN = "a whole condition stands in a column headed `when`"
 HEAD = """enum stage { idle, moving }
@@ -179,3 +189,204 @@ def test_a_variable_that_hides_its_type_is_told(member: str, help_: str) -> None
         .replace("state stage", "state now")
         .replace(": stage =", ": now =")
     )
+
+
+# --- a cell that reads what an earlier cell wrote: two spellings that mean what they say ---
+
+SEQUENCE = """
+enum order { rest, reach }
+enum status { done, executing, failed }
+link below {
+  command : order rest rest
+  status : status done done failed failed executing executing
+  order { far : int 0 .. 9 }
+}
+commands arm : below
+record pair { a : int 0 .. 9  b : int 0 .. 9 }
+input i : int 0 .. 2
+state n : int 0 .. 9
+state m : int 0 .. 9
+state p : pair
+state q : pair
+state xs : array[3] of int 0 .. 9
+state x : int 0 .. 9 deferred until true
+output o : int 0 .. 9
+procedure put(v : int 0 .. 9) { m := v }
+procedure bump { n := min(n + 1, 9) }
+procedure deeper { bump }
+procedure copy { m := n }
+"""
+
+
+def in_order(headings: str, cells: str) -> str:
+    """A program with one line."""
+    dashes = "|".join("-" for _ in headings.split("|"))
+    return f"{SEQUENCE}table t {{\n| line | when || {headings} |\n|-|-||{dashes}|\n| only | true || {cells} |\n}}\n"
+
+
+TOLD = {
+    "a value": ("n | m", "i | n", "n"),
+    "part of a value": ("n | m", "i | max(n, 3)", "n"),
+    "an argument": ("n | procedures", "i | put(n)", "n"),
+    "an assignment": ("n | procedures", "i | m := n", "n"),
+    "what a call wrote": ("procedures | m", "bump | n", "n"),
+    "what a call of a call wrote": ("procedures | m", "deeper | n", "n"),
+    "an index": ("n | m", "i | xs[n mod 3]", "n"),
+    "the place": ("n | procedures", "i | xs[n mod 3] := 1", "n"),
+    "an element": ("procedures | m", "xs[i] := 1 | xs[2]", "xs[2]"),
+    "some element": ("procedures | m", "xs[1] := 1 | xs[i]", "xs[1]"),
+    "a member": ("p.a | m", "i | p.a", "p.a"),
+    "a record": ("p.b | q", "i | p", "p.b"),
+    "an output": ("o | m", "i | o", "o"),
+    "an order": ("n | arm", "i | reach(far := n)", "n"),
+    "over a cell between": ("n | o | m", "i | 3 | n", "n"),
+    "status": ("status_out | command_out", "n := i | put(n)", "n"),
+}
+
+
+@pytest.mark.parametrize("case", TOLD)
+def test_a_cell_that_reads_what_an_earlier_one_wrote_is_told(case: str) -> None:
+    headings, cells, name = TOLD[case]
+    text = in_order(headings, cells)
+    found = refused(text)
+    assert [each.code for each in found] == [Code.READ_AFTER_WRITE], found
+    assert f"reads `{name}`" in found[0].message
+    where = found[0].primary.span
+    assert text[where.start : where.end].strip() in cells
+    assert found[0].related[0].span.start < where.start
+
+
+FINE = {
+    "before it is written": ("m | n", "n | i"),
+    "in one cell": ("procedures", "n := i; m := n"),
+    "by a procedure": ("n | procedures", "i | copy"),
+    "another element": ("procedures | m", "xs[1] := 1 | xs[2]"),
+    "another member": ("p.a | m", "i | p.b"),
+    "its own": ("n", "min(n + 1, 9)"),
+    "what is next": ("procedures | m", "next x := i | x"),
+    "as it is": ("n | m", "n | n"),
+    "written anew in the cell": ("n | procedures", "i | n := 1; m := n"),
+}
+
+
+@pytest.mark.parametrize("case", FINE)
+def test_what_says_its_order_is_fine(case: str) -> None:
+    program_of(in_order(*FINE[case]))
+
+
+def after(headings: str, cells: str) -> tuple[int, int]:
+    """What `n` and `m` are after the line, `n` was 5."""
+    program = program_of(in_order(headings, cells))
+    then = run_table(program, program.tables[0], {**initial(program), "n": 5}).snapshot
+    return int(then["n"]), int(then["m"])
+
+
+def test_both_spellings_of_the_help_mean_what_they_say() -> None:
+    old, new = refused(in_order("n | m", "2 | n"))[0].help
+    assert old == "to mean the value before the line, let column `m` stand left of column `n`"
+    assert new == "to mean the new value, write both in one cell under `procedures`: `n := 2; m := n`"
+    assert after("m | n", "n | 2") == (2, 5)
+    assert after("procedures", "n := 2; m := n") == (2, 2)
+
+
+def test_what_is_exchanged_needs_a_local() -> None:
+    assert "keeps one of them in a local" in refused(in_order("n | m", "m | n"))[0].help[0]
+    assert "a procedure that does both" in refused(in_order("n | arm", "2 | reach(far := n)"))[0].help[1]
+
+
+# --- with what a variable starts: what is written, its safe value, 0, or what is nearest to 0 ---
+
+TEXT = """
+enum light { red, green }
+type offset = real -2.0 .. 5.0
+record pair { a : int -9 .. 9  b : int 3 .. 9 = 4  c : array[2] of int -9 .. 9 = -1  d : offset }
+input seen : int -5 .. 5
+input of_pair : pair
+output speed : int -400 .. 400 safe 7
+output own : int -400 .. 400 = 2 safe 7
+output shown : light safe green
+output lamp : bool safe true
+state n : int -9 .. 9 restart 3
+state x : offset
+state s : single -2.5 .. 1.5
+state cells : array[2] of int 2 .. 9 = 5
+state pairs : array[1] of pair
+state later : int -9 .. 9 deferred until true
+property moves : n >= was n
+"""
+STARTS = {
+    "seen": 0,
+    "of_pair.a": 0,
+    "of_pair.b": 4,
+    "of_pair.c[0]": -1,
+    "of_pair.c[1]": -1,
+    "of_pair.d": 0.0,
+    "speed": 7,
+    "own": 2,
+    "shown": 1,
+    "lamp": True,
+    "n": 0,
+    "x": 0.0,
+    "s": 0.0,
+    "cells[0]": 5,
+    "cells[1]": 5,
+    "pairs[0].a": 0,
+    "pairs[0].b": 4,
+    "pairs[0].c[0]": -1,
+    "pairs[0].c[1]": -1,
+    "pairs[0].d": 0.0,
+    "later": 0,
+    "later.next": 0,
+}
+
+
+def test_what_starts_with_what() -> None:
+    program = compile_text(TEXT)
+    assert isinstance(program, Program), program
+    assert {str(name): value for name, value in initial(program).items()} == STARTS
+    unset = {str(v.name).partition(".")[0].partition("[")[0] for v in program.variables if not v.given}
+    assert unset == {"seen", "of_pair", "n", "x", "s", "pairs", "later"}
+    meant = {str(v.name) for v in program.variables if v.given}
+    assert "pairs[0].b" in meant
+    assert "of_pair.b" in meant
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "help_"),
+    [
+        (
+            "state n : int 1 .. 9",
+            "`n` starts: 0 is not in 1 .. 9, so that it is 1",
+            "its type, such as `= 1`",
+        ),
+        ("input n : int -9 .. -2 [mm] clamp", "0 is not in -9 .. -2, so that it is -2", "such as `= -2`"),
+        ("output x : single 0.5 .. 1.5", "0 is not in 0.5 .. 1.5, so that it is 0.5", "such as `= 0.5`"),
+        ("state a : array[300] of int 1 .. 2", "`a[0]` starts: 0 is not in 1 .. 2", "after its type, such"),
+        (
+            "record r { f : array[2] of real -2.0 .. -1.0 } state a : array[2] of r",
+            "`a[0].f[0]` starts: 0 is not in -2.0 .. -1.0",
+            "after the type of field `f`, such as `= -1.0`",
+        ),
+    ],
+)
+def test_where_nothing_says_it_a_warning_does(text: str, message: str, help_: str) -> None:
+    found = [each for each in reported(text) if each.code is Code.NO_START]
+    assert [each.severity for each in found] == [Severity.WARNING]
+    assert message in found[0].message
+    assert help_ in found[0].help[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("record r { f : int 1 .. 3 = 4 }", Code.OUT_OF_RANGE_CONSTANT),
+        ("record r { f : int 1 .. 3 = true }", Code.KIND),
+        ("record q { f : bool } record r { f : q = true }", Code.KIND),
+        ("record q { f : bool } state r : q = true", Code.KIND),
+        ("state n : int 0 .. 9 record r { f : int 1 .. 3 = n }", Code.NOT_CONSTANT),
+    ],
+)
+def test_a_start_is_a_value_of_the_type(text: str, code: Code) -> None:
+    found = compile_text(text)
+    assert isinstance(found, tuple)
+    assert [each.code for each in found] == [code]

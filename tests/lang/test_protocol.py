@@ -213,7 +213,7 @@ BOUNDS = {
 """Cycles in which the arm has to echo, and to answer."""
 
 
-@settings(max_examples=250)
+@settings(max_examples=80)
 @given(runs, st.sampled_from([0, 0, 65534]), st.sampled_from([*BOUNDS]))
 def test_a_level_that_declares_its_neighbours_keeps_the_protocol_of_the_paper(
     drawn: list[tuple[Any, Any, int]], begun: int, bounds: str

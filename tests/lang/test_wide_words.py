@@ -5,7 +5,7 @@ choices, so that each kind of term meets each other. The interpreter is the orac
 """
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsc.lang.expressions.words import bits_alone
@@ -131,6 +131,7 @@ def holds_so(condition: str, given_points: list[dict[str, Value]]) -> bool:
     return True
 
 
+@settings(max_examples=40)
 @given(conditions, st.lists(points, min_size=1, max_size=4))
 def test_z3_says_what_the_interpreter_says(condition: str, given_points: list[dict[str, Value]]) -> None:
     holds_so(condition, given_points)
