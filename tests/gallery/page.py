@@ -2,6 +2,7 @@
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,10 @@ REPO = Path(__file__).parents[2]
 GALLERY = REPO / "tables" / "gallery"
 PAGE = GALLERY / "README.md"
 ENTRIES = tuple(sorted(path.parent for path in GALLERY.glob("*/README.md")))
+MENDED = sorted(
+    path for path in GALLERY.glob("*/*.rcs") if path.name != "words.rcs" and "published" not in path.name
+)
+"""Tables that are not as published."""
 
 NAMES = {
     "RCS401": "gap",
@@ -57,6 +62,11 @@ def page() -> str:
         assert all((mark, end)), f"{PAGE}: no place for {name}"
         text = before + mark + rows + end + after
     return text
+
+
+def written(paths: Iterable[Path]) -> str:
+    """Return paths as a command has them, from the root."""
+    return " ".join(str(path.relative_to(REPO)) for path in paths)
 
 
 def findings_table() -> str:
