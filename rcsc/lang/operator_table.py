@@ -85,16 +85,25 @@ class Op(StrEnum):
     Attributes:
         strength: How tightly it binds.
         meaning: Its value, of operands of one kind.
+        result: How its result is called, for arithmetic.
     """
 
     strength: int
     meaning: Callable[..., Any]
+    result: str
 
-    def __new__(cls, word: str, strength: int = POSTFIX, meaning: Callable[..., Any] = abs) -> Self:
+    def __new__(
+        cls, word: str, strength: int = POSTFIX, meaning: Callable[..., Any] = abs, result: str = ""
+    ) -> Self:
         """Make a member from its row."""
         member = str.__new__(cls, word)
-        member._value_, member.strength, member.meaning = word, strength, meaning
+        member._value_, member.strength, member.meaning, member.result = word, strength, meaning, result
         return member
+
+    @property
+    def infix(self) -> bool:
+        """Whether it is written between two operands."""
+        return self.strength not in (NEGATION, SIGN, POSTFIX)
 
     IMPLIES = "implies", IMPLICATION, lambda a, b: not a or b
     OR = "or", DISJUNCTION, lambda a, b: a or b
@@ -107,15 +116,15 @@ class Op(StrEnum):
     LE = "<=", RELATION, operator.le
     GT = ">", RELATION, operator.gt
     GE = ">=", RELATION, operator.ge
-    ADD = "+", SUM, operator.add
-    SUB = "-", SUM, operator.sub
-    MUL = "*", PRODUCT, operator.mul
-    DIV = "/", PRODUCT, lambda a, b: a / b if isinstance(a, float) else divide(a, b)
-    MOD = "mod", PRODUCT, lambda a, b: a - b * divide(a, b)
-    NEG = "-x", SIGN, operator.neg
-    ABS = "abs", POSTFIX, abs
-    MIN = "min", POSTFIX, lambda a, b: b if b < a else a  # noqa: FURB136 - says which it is where a NaN is among them
-    MAX = "max", POSTFIX, lambda a, b: b if b > a else a  # noqa: FURB136 - as above
+    ADD = "+", SUM, operator.add, "sum"
+    SUB = "-", SUM, operator.sub, "difference"
+    MUL = "*", PRODUCT, operator.mul, "product"
+    DIV = "/", PRODUCT, lambda a, b: a / b if isinstance(a, float) else divide(a, b), "quotient"
+    MOD = "mod", PRODUCT, lambda a, b: a - b * divide(a, b), "remainder"
+    NEG = "-x", SIGN, operator.neg, "negative"
+    ABS = "abs", POSTFIX, abs, "absolute value"
+    MIN = "min", POSTFIX, lambda a, b: b if b < a else a, "least"  # noqa: FURB136 - says which where a NaN is one
+    MAX = "max", POSTFIX, lambda a, b: b if b > a else a, "greatest"  # noqa: FURB136 - as above
     TO_INT = "int", POSTFIX, int
     TO_REAL = "real", POSTFIX, float
     TO_SINGLE = "single", POSTFIX, single
@@ -132,6 +141,8 @@ Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]
 Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX]
 """From numbers of one kind to a number of it."""
 Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE]
+Division: TypeAlias = Literal[Op.DIV, Op.MOD]
+"""Undefined of a divisor that is zero."""
 Strict: TypeAlias = Literal[Op.NOT] | Comparison | Arithmetic | Conversion
 """Operators that always evaluate all operands."""
 Operator: TypeAlias = Logic | Strict
@@ -142,6 +153,18 @@ Core: TypeAlias = Literal[Op.NOT, Op.AND] | Ordering | Arithmetic | Conversion
 
 LOGIC: frozenset[Logic] = frozenset(get_args(Logic))
 COMPARISONS: frozenset[Comparison] = frozenset(get_args(Comparison))
+DIVISIONS: frozenset[Division] = frozenset(get_args(Division))
+CALCULATIONS: frozenset[Arithmetic | Conversion] = frozenset((*get_args(Arithmetic), *get_args(Conversion)))
+SCALING = frozenset({Op.MUL, Op.DIV})
+"""Their units multiply; the operands and the result of other arithmetic share one unit."""
+WHOLE = frozenset({Op.MOD})
+"""Arithmetic of integers alone."""
+ROUNDED = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV})
+"""Arithmetic whose result, of reals, is rounded."""
+EXTREMES = frozenset({Op.MIN, Op.MAX})
+"""Functions that give one of their two operands; the others called have one operand."""
+DIVIDED_FIRST = frozenset({Op.MOD})
+"""Operators whose quotient the machine computes first: it must stay in its 64 bits too."""
 MIRRORED: dict[Op, Comparison] = {
     Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE,
 }  # fmt: skip
@@ -160,6 +183,16 @@ def is_logic(op: Operator) -> "TypeIs[Logic]":
 def is_comparison(op: Operator) -> "TypeIs[Comparison]":
     """Return whether it compares."""
     return op in COMPARISONS
+
+
+def is_division(op: Operator) -> "TypeIs[Division]":
+    """Return whether it is undefined of a divisor that is zero."""
+    return op in DIVISIONS
+
+
+def is_conversion(op: Operator) -> "TypeIs[Conversion]":
+    """Return whether it takes a number to a number of another kind."""
+    return op in get_args(Conversion)
 
 
 def is_arithmetic(op: Operator) -> "TypeIs[Arithmetic]":

@@ -30,7 +30,7 @@ from rcsc.code.emit.identifiers import Names
 from rcsc.code.emit.scope import SIGNIFICANT, hashed
 from rcsc.lang import model
 from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Single, Statement, Value
-from rcsc.lang.operator_table import Operator
+from rcsc.lang.operator_table import ROUNDED, Operator
 
 STATE, FAULT, FAULT_AT, LINE = (
     Name("s"),
@@ -135,10 +135,6 @@ _INFIX = {
 }  # fmt: skip
 
 
-_ROUNDED = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV})
-"""Operations on singles whose double is rounded once more."""
-
-
 def _many_digits(kind: Int) -> bool:
     """Return whether some number of the type does not fit a double exactly."""
     return max(abs(kind.low), abs(kind.high)) > 1 << 53
@@ -174,7 +170,7 @@ class PyText(Text):
                 return Round(self.among(self.expr(subject), subject.type, values))
             case model.Apply(op=op, args=args):
                 result = self._applied(op, tuple(map(self.expr, args)), args[0].type)
-                rounds = op in _ROUNDED if isinstance(args[0].type, Single) else op is Op.TO_SINGLE
+                rounds = op in ROUNDED if isinstance(args[0].type, Single) else op is Op.TO_SINGLE
                 bare = result.inner if isinstance(result, Round) else result
                 return Invoke("_single", (bare,)) if rounds else result
             case _:

@@ -42,6 +42,7 @@ from rcsc.lang.model import (  # fmt: skip
     pending,
     spell,
 )
+from rcsc.lang.operator_table import is_division
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import Node
@@ -292,10 +293,9 @@ def always_defined(condition: Expr) -> bool:
 
 def _may_fail(part: Expr) -> bool:
     match part:
-        case Apply(op=Op.DIV | Op.MOD, args=(_, Literal(value=divisor)), type=Int()):
-            return divisor == 0
-        case Apply(op=Op.DIV | Op.MOD):
-            return True
+        case Apply(op=op, args=args) if is_division(op):
+            divisor = args[1]
+            return not (isinstance(part.type, Int) and isinstance(divisor, Literal) and divisor.value)
         case Apply(op=Op.TO_INT, args=(operand,)):
             return not isinstance(operand.type, Bool)
     return False

@@ -592,9 +592,7 @@ def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tu
 def successor(number: Node) -> Node:
     """Return the next number of 16 bits."""
     step, modulus = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
-    return values.arithmetic(
-        Op.MOD, (values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus), number.kind
-    )
+    return values.remainder(values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus, number.kind)
 
 
 def line_names(table: Table) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import I64_MAX, I64_MIN, U64_MAX, Apply, Expr, Int, Real, Scalar, Select, Single, Unit
-from rcsc.lang.operator_table import Arithmetic, Op, divide, single
+from rcsc.lang.operator_table import Arithmetic, Op, divide, is_division, single
 
 WIDEST = 2**200
 """Integer bounds stop here: a result beyond 64 bits is refused by its own proof obligation."""
@@ -50,7 +50,7 @@ def _may_fail(applied: Apply) -> bool:
         low, high = word(numbers)
         if least < low or greatest > high:
             return True
-    if applied.op not in (Op.DIV, Op.MOD):
+    if not is_division(applied.op):
         return False
     divisor = applied.args[1].type
     return not (isinstance(divisor, Int | Real) and divisor.low > 0 and math.isfinite(divisor.high))

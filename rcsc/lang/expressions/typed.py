@@ -46,7 +46,18 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.lang.operator_table import BITWISE, Op, Operator, is_comparison, is_logic
+from rcsc.lang.operator_table import (
+    BITWISE,
+    EXTREMES,
+    SCALING,
+    WHOLE,
+    Op,
+    Operator,
+    is_arithmetic,
+    is_comparison,
+    is_conversion,
+    is_logic,
+)
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
@@ -507,16 +518,13 @@ def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
     left, right = pair
     if not (_number(scope, left, written.left) and _number(scope, right, written.right)):
         return None
-    if op is Op.MOD and isinstance(left.expr.type, Real):
-        scope.report(Code.KIND, "`mod` takes whole numbers", written.span)
+    if op in WHOLE and isinstance(left.expr.type, Real):
+        scope.report(Code.KIND, f"`{op.value}` takes whole numbers", written.span)
         return None
-    match op:
-        case Op.MUL | Op.DIV:
-            return scaled(scope, op, left, right, written.span)
-        case Op.ADD | Op.SUB | Op.MOD:
-            return alike(scope, op, (left, right), written.span)
-        case _:
-            raise ValueError(op)  # the grammar has no such operator of two operands
+    assert is_arithmetic(op)  # the grammar has no other operator of two operands
+    if op in SCALING:
+        return scaled(scope, op, left, right, written.span)
+    return alike(scope, op, (left, right), written.span)
 
 
 def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
@@ -701,8 +709,8 @@ def within(scope: Scope, subject: Typed, least: Typed, most: Typed, span: Span) 
 def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
     if written.function.text == "count":
         return _count(scope, body, written)
-    op = Op(written.function.text)
-    want = 2 if op in (Op.MIN, Op.MAX) else 1
+    op: Operator = Op(written.function.text)
+    want = 2 if op in EXTREMES else 1
     if len(written.args) != want:
         scope.report(
             Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span
@@ -719,13 +727,10 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
         return counted(operands[0].expr, written.span)
     if not all(_number(scope, o, w) for o, w in zip(operands, written.args, strict=True)):
         return None
-    match op:
-        case Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
-            return converted(scope, op, operands[0], written.span)
-        case Op.ABS | Op.MIN | Op.MAX:
-            return alike(scope, op, operands, written.span)
-        case _:
-            raise ValueError(op)  # the grammar has no such function
+    if is_conversion(op):
+        return converted(scope, op, operands[0], written.span)
+    assert is_arithmetic(op)  # the grammar has no other function
+    return alike(scope, op, operands, written.span)
 
 
 def _count(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:

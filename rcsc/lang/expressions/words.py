@@ -294,6 +294,16 @@ def _field(scope: Scope, word: Expr, high: int, low: int, span: Span) -> Expr:
     return upper if high >= bits_of(word) - 1 else _by(scope, Op.MOD, upper, 1 << high - low + 1, span)
 
 
+def cut(number: Expr, bits: int, low: int, most: int) -> Expr:
+    """Return so many bits from `low` upwards of a number from 0 to `most`, as a number."""
+    rest, top = 1 << bits, most >> low
+    if low:
+        number = Apply(Op.DIV, (number, Literal(1 << low, Int(1 << low, 1 << low))), Int(0, top))
+    if top < rest:
+        return number
+    return Apply(Op.MOD, (number, Literal(rest, Int(rest, rest))), Int(0, rest - 1))
+
+
 def _is_power(word: Expr, divisor: Value) -> bool:
     """Return whether a word is divided by 2, 4, 8 or a greater power of two."""
     return isinstance(word.type, Int) and word.type.low >= 0 and divisor > 1 and int(divisor).bit_count() == 1

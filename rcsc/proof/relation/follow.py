@@ -20,7 +20,6 @@ from rcsc.lang.model import (
     Kind,
     Level,
     OneTable,
-    Op,
     ProcedureName,
     Program,
     Real,
@@ -30,6 +29,7 @@ from rcsc.lang.model import (
     Value,
     pending,
 )
+from rcsc.lang.operator_table import CALCULATIONS
 from rcsc.proof.relation.questions import needed, possible, stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
@@ -39,10 +39,6 @@ from rcsc.proof.symbolic.encode import within
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import Node
-
-_ARITHMETIC = frozenset(
-    {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE}
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +94,7 @@ def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
         numbers: Others for each result: two results are not the same.
     """
     for node in values.parts_first(*nodes):
-        if node.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (node, *node.args)):
+        if node.op in CALCULATIONS and any(isinstance(part.kind, Real) for part in (node, *node.args)):
             if node.term is None:
                 node.term = smt.variable(f"double!{next(numbers)}", node.kind)
             if node.ordered:

@@ -248,13 +248,13 @@ class Bits:
                 return self._difference(a, b)
             case Op.MUL if left.known or right.known:
                 return self._product(b, int(left.low)) if left.known else self._product(a, int(right.low))
-            case Op.MOD if wraps_once(node):
+            case _ if wraps_once(node):
                 return self._choice(self._below(a, b), a, self._difference(a, b))
             case Op.DIV if takes_bits(node):
                 return a[int(right.low).bit_length() - 1 :] or (FALSE,)
-            case Op.MOD if takes_bits(node):
+            case _ if takes_bits(node):
                 return (*a[: int(right.low).bit_length() - 1], FALSE)
-            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
+            case _:
                 return self._any(node)
 
     def _any(self, node: Node) -> Word:

@@ -29,7 +29,16 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
-from rcsc.lang.operator_table import Comparison, Op, Operator, Signed, is_comparison, is_logic, truth_function
+from rcsc.lang.operator_table import (
+    Comparison,
+    Op,
+    Operator,
+    Signed,
+    is_comparison,
+    is_division,
+    is_logic,
+    truth_function,
+)
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import lowest
@@ -64,7 +73,7 @@ def encode(expr: Expr, frame: Frame) -> Term:
             term = encode(subject, frame)
             kind = subject.type
             return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
-        case Apply(op=Op.DIV | Op.MOD as op, args=(number, Literal(value=by))) if _splits(number, by):
+        case Apply(op=op, args=(number, Literal(value=by))) if is_division(op) and _splits(number, by):
             return smt.part(op.value, encode(number, frame), int(by))
         case Apply(op=Op.AND, args=(_, Apply(op=Op.EQ | Op.NE) as last)) if mask_of(last) is not None:
             mask = mask_of(expr)

@@ -26,24 +26,22 @@ from rcsc.lang.model import (
     Scalar,
     Select,
 )
-from rcsc.lang.operator_table import UNDECIDED, Arithmetic, Logic, Op, is_comparison, is_logic
+from rcsc.lang.operator_table import (
+    DIVIDED_FIRST,
+    UNDECIDED,
+    Arithmetic,
+    Logic,
+    Op,
+    is_comparison,
+    is_division,
+    is_logic,
+)
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import FALSE, TRUE, Fact, Node
 
 MOST_STEPS = 2_000_000
 """Statements and array elements that one run follows."""
 
-_RESULTS: dict[Arithmetic, str] = {
-    Op.ADD: "sum",
-    Op.SUB: "difference",
-    Op.MUL: "product",
-    Op.DIV: "quotient",
-    Op.MOD: "remainder",
-    Op.NEG: "negative",
-    Op.ABS: "absolute value",
-    Op.MIN: "least",
-    Op.MAX: "greatest",
-}
 _LEAVES = "can leave 64 bits"
 
 
@@ -289,16 +287,16 @@ class Evaluation:
         return args[0], divisor if fact is None else values.narrowed(divisor, *fact)
 
     def _number(self, op: Arithmetic, expr: Apply, args: tuple[Node, ...]) -> Node:
-        if op in (Op.DIV, Op.MOD):
+        if is_division(op):
             args = self._divisor(expr, args)
         if not isinstance(expr.type, Int):
             return values.arithmetic(op, args, expr.type)
         args, ends = self._in_words(expr, args), _word_of(expr)
-        if op is Op.MOD:  # the machine divides first
+        if op in DIVIDED_FIRST:
             quotient = values.arithmetic(Op.DIV, args, expr.type)
-            self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {_RESULTS[Op.DIV]} {_LEAVES}", expr.span)
+            self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {Op.DIV.result} {_LEAVES}", expr.span)
         result = values.arithmetic(op, args, expr.type)
-        return self.owe_inside(Code.OVERFLOW, result, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
+        return self.owe_inside(Code.OVERFLOW, result, ends, f"the {op.result} {_LEAVES}", expr.span)
 
     def _in_words(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
         """Operands that are integers within the 64 bits that they share with each other and the result."""

@@ -132,12 +132,12 @@ class Keyed:
                 return smt.integer_operation(op.value, parts[0], parts[1])
             case Op.MUL if left.known or right.known:
                 return smt.integer_operation(op.value, parts[0], parts[1])
-            case Op.MOD if wraps_once(node):
+            case _ if wraps_once(node):
                 wrapped = smt.integer_operation("-", parts[0], parts[1])
                 return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
-            case Op.DIV | Op.MOD if takes_bits(node):
+            case _ if takes_bits(node):
                 return smt.integer_operation(op.value, parts[0], parts[1])
-            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL | Op.TO_SINGLE:
+            case _:
                 return self.any(node)
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more

@@ -28,6 +28,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import (
+    DIVISIONS,
     Arithmetic,
     Comparison,
     Conversion,
@@ -265,14 +266,23 @@ def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | 
     return bounds.low, bounds.high
 
 
-def wraps_once(remainder: Node) -> bool:
-    """Whether a `mod` subtracts its divisor at most once: the value is from 0 to below twice the divisor."""
-    value, divisor = remainder.args
+def remainder(value: Node, divisor: Node, kind: Scalar) -> Node:
+    """The remainder of a division of integers; `kind` is that of the result."""
+    return arithmetic(Op.MOD, (value, divisor), kind)
+
+
+def wraps_once(node: Node) -> bool:
+    """Whether it is a `mod` that subtracts its divisor at most once: the value is from 0 to below twice the divisor."""
+    if node.op != Op.MOD:
+        return False
+    value, divisor = node.args
     return divisor.known and value.low >= 0 and value.high < 2 * divisor.low
 
 
 def takes_bits(node: Node) -> bool:
-    """Whether a `/` or `mod` is by a power of two, of what is never negative: then it takes some bits of it."""
+    """Whether it is a division by a power of two, of what is never negative: then it takes some bits of it."""
+    if node.op not in DIVISIONS:
+        return False
     value, divisor = node.args
     return divisor.known and value.low >= 0 and divisor.low > 0 and int(divisor.low).bit_count() == 1
 

@@ -28,6 +28,7 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
+from rcsc.lang.operator_table import EXTREMES
 from rcsc.proof.procedures.discharge import Tally
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
@@ -320,7 +321,7 @@ def _ends(node: Node) -> Iterator[Node]:
             seen.add(root)
             if root.op == CHOICE:
                 waiting.extend(root.args[1:])
-            elif root.op in (Op.MIN, Op.MAX):
+            elif root.op in EXTREMES:
                 waiting.extend(root.args)
             else:
                 yield root

@@ -41,7 +41,7 @@ from rcsc.lang.model import (
     Value,
     Variable,
 )
-from rcsc.lang.operator_table import Arithmetic, Comparison, Operator
+from rcsc.lang.operator_table import EXTREMES, Arithmetic, Comparison, Operator, is_division
 
 Side = TypeVar("Side")
 MOST_WAYS = 5000
@@ -142,7 +142,7 @@ class Compares:
 
     def sides(self, operands: Sequence[Side], zero: Side) -> tuple[Side, Side]:
         """Return what is compared: the last operand, with the first or with 0."""
-        return operands[-1], operands[0] if self.op in (Op.MIN, Op.MAX) else zero
+        return operands[-1], operands[0] if self.op in EXTREMES else zero
 
 
 @dataclass(eq=False, frozen=True, slots=True)
@@ -238,7 +238,7 @@ class _Marker:
                 mark = self.operator(op, expr)
                 given = tuple(map(self.expr, args))
                 return expr if mark is None else replace(expr, op=cast(Operator, mark), args=given)
-            case Apply(op=Op.DIV | Op.MOD as op, args=(whole, divisor)) if _either_sign(divisor):
+            case Apply(op=op, args=(whole, divisor)) if is_division(op) and _either_sign(divisor):
                 mark, given = self.operator(op, expr), (self.expr(whole), self.expr(divisor))
                 return replace(expr, op=cast(Operator, mark), args=given)
             case Apply(op=Op.TO_INT, args=(arg,)) if isinstance(arg.type, Bool):
@@ -263,7 +263,7 @@ class _Marker:
         name = f"{op.value} of {held}"
         if name not in self.operators:
             left = "operand" if op is Op.ABS else "second"
-            right = "first" if op in (Op.MIN, Op.MAX) else "0"
+            right = "first" if op in EXTREMES else "0"
             own = Decision(Place("operator", name), 0, (f"{left} {test.value} {right}",))
             self.operators[name] = own
         return Compares(self.operators[name], op, test)

@@ -4,8 +4,7 @@ In: an expression. Out: text, with parentheses around every operand that is not 
 """
 
 from rcsc.lang.model import Among, Apply, Expr, Literal, Op, Read, ReadLocal, Select, spell
-
-CALLED = frozenset({Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE})
+from rcsc.lang.operator_table import POSTFIX
 
 
 def words(expr: Expr) -> str:
@@ -21,7 +20,7 @@ def words(expr: Expr) -> str:
             return f"{leaves[0].rsplit('[', 1)[0]}[{words(index)}]"
         case Among(subject=subject, values=values):
             return f"{_inner(subject)} in {{{', '.join(spell(subject.type, value) for value in values)}}}"
-        case Apply(op=op, args=args) if op in CALLED:
+        case Apply(op=op, args=args) if op.strength == POSTFIX:
             return f"{op.value}({', '.join(words(arg) for arg in args)})"
         case Apply(op=op, args=(operand,)):
             return f"{'-' if op is Op.NEG else 'not '}{_inner(operand)}"

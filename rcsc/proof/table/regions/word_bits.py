@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from rcsc.lang.expressions.conditions import box_of
-from rcsc.lang.expressions.words import Field, Mask, field_of, mask_of
+from rcsc.lang.expressions.words import Field, Mask, cut, field_of, mask_of
 from rcsc.lang.interval_sets import joined, meet
 from rcsc.lang.leaves import conjuncts, operands, rebuilt
 from rcsc.lang.leaves import parts as every_part
@@ -34,7 +34,6 @@ from rcsc.lang.model import (
     VariableName,
     key_bounds,
 )
-from rcsc.lang.operator_table import Arithmetic
 
 MOST_TOGETHER = 12
 """Bits of one part: what a condition says of them is tried for each value."""
@@ -71,10 +70,7 @@ class Part:
     def of(self, leaf: Variable) -> Expr:
         """Return the bits as a number, computed from the whole word."""
         number: Expr = Read(leaf.name, leaf.type)
-        top = key_bounds(leaf.type)[1] >> self.low
-        if self.low:
-            number = _by(Op.DIV, number, 1 << self.low, top)
-        return number if top <= self.kind.high else _by(Op.MOD, number, 1 << self.bits, self.kind.high)
+        return cut(number, self.bits, self.low, key_bounds(leaf.type)[1])
 
     @classmethod
     def named(cls, name: str) -> "Part | None":
@@ -221,12 +217,4 @@ def _within(condition: Expr, part: Part) -> Expr:
     if field is None:
         return rebuilt(condition, lambda operand: _within(operand, part))
     number: Expr = Read(VariableName(part.name), part.kind)
-    if field.low > part.low:
-        by = 1 << field.low - part.low
-        number = _by(Op.DIV, number, by, part.kind.high // by)
-    many = 1 << field.high - field.low + 1
-    return _by(Op.MOD, number, many, many - 1) if field.high < part.high else number
-
-
-def _by(op: Arithmetic, number: Expr, by: int, most: int) -> Expr:
-    return Apply(op, (number, Literal(by, Int(by, by))), Int(0, most))
+    return cut(number, field.high - field.low + 1, field.low - part.low, part.kind.high)

@@ -8,8 +8,6 @@ from rcsc.proof.symbolic.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Nod
 
 MOST_CHARACTERS = 100
 
-_INFIX = {Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.AND}
-
 
 class _TooLongError(Exception):
     """The text would be too long."""
@@ -59,7 +57,7 @@ def _operation(node: Node, depth: int) -> str:
     kinds = [arg.kind for arg in node.args]
     inner = _fuller(kinds)
     parts = [_worded(arg, inner, depth + 1) for arg in node.args]
-    if Op(node.op) in _INFIX and len(parts) == 2:
+    if Op(node.op).infix:
         return f"({parts[0]} {node.op} {parts[1]})"
     return f"-{parts[0]}" if node.op == Op.NEG else f"{node.op}({', '.join(parts)})"
 

@@ -27,6 +27,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.model import Value as Scalars
+from rcsc.lang.operator_table import ROUNDED
 from rcsc.proof.procedures.discharge import Tally
 from rcsc.proof.relation.effect import Effect, Meaning, Shared
 from rcsc.proof.solvers import smt
@@ -265,7 +266,7 @@ class Versions:
         return {**initial(program), **given}
 
 
-_HARD = {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.TO_REAL, Op.TO_SINGLE}
+_HARD = ROUNDED | {Op.TO_REAL, Op.TO_SINGLE}
 
 
 def is_hard(condition: Node) -> bool:
