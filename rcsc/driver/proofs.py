@@ -99,6 +99,7 @@ class _Memory:
         )  # fmt: skip
         # (a procedure that no line calls is proved by itself, so which are called is part of it)
         self.common = hashlib.sha256("\n".join(map(repr, parts)).encode()).hexdigest()
+        self.keys = {table.name: (self.common, digest(table), self._text(table)) for table in program.tables}
 
     def rest(self) -> bool:
         """Return whether all but the tables is known to be right."""
@@ -106,7 +107,7 @@ class _Memory:
 
     def table(self, table: Table) -> _Kept | None:
         """Return the kept report and notes of the table."""
-        kept = self.cache.load(_Kept, *self._key(table))
+        kept = self.cache.load(_Kept, *self.keys[table.name])
         if kept is None:
             return None
         place = self._place(table)
@@ -132,17 +133,15 @@ class _Memory:
             report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
                 placed = tuple(moved(note, -place.start, "") for note in notes)
-                self.cache.store(_Kept(report, placed), *self._key(verdict.table))
+                self.cache.store(_Kept(report, placed), *self.keys[verdict.table.name])
         if not rest:
             self.cache.store(_Rest(), self.common)
 
     def _place(self, table: Table) -> Span:
         return _extent(table, self.loaded.sources[table.span.file].text)
 
-    def _key(self, table: Table) -> tuple[str, ...]:
-        text = self.loaded.sources[table.span.file].slice(self._place(table))
-        own = next(declared for declared in self.program.tables if declared.name == table.name)
-        return (self.common, digest(own), text)
+    def _text(self, table: Table) -> str:
+        return self.loaded.sources[table.span.file].slice(self._place(table))
 
 
 def _extent(table: Table, text: str) -> Span:

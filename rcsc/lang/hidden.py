@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from rcsc.lang.leaves import free_name
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import Declared, Int, Procedure, Program, Scalar, Test, Variable, VariableName
 
@@ -53,7 +54,7 @@ def matched(first: Program, second: Program) -> tuple[Program, Program]:
     taken = {str(v.name) for program in (first, second) for v in program.variables if fed_with(v) is None}
     renames: tuple[dict[str, str], dict[str, str]] = ({}, {})
     for feed in dict.fromkeys((*feeds[1], *feeds[0])):
-        name = _free(str(feeds[1].get(feed, feeds[0].get(feed))), taken)
+        name = free_name(str(feeds[1].get(feed, feeds[0].get(feed))), taken)
         taken.add(name)
         for own, to in zip(feeds, renames, strict=True):
             if feed in own:
@@ -68,15 +69,6 @@ def matched(first: Program, second: Program) -> tuple[Program, Program]:
 
 def _fed(program: Program) -> dict[_Feed, str]:
     return {feed: str(v.name) for v in program.variables if (feed := fed_with(v)) is not None}
-
-
-def _free(name: str, taken: set[str]) -> str:
-    """Return the name, or the first of `NAME_2`, `NAME_3` that nothing else has; for an array element numbered before the index."""
-    base, bracket, rest = name.partition("[")
-    number, free = 2, name
-    while free in taken:
-        free, number = f"{base}_{number}{bracket}{rest}", number + 1
-    return free
 
 
 def _limits(*programs: Program) -> dict[_Feed, Scalar]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from rcsc.lang.model import Box
+from rcsc.lang.model import Box, Test
 from rcsc.lang.operator_table import MIRRORED, Comparison, Op
 
 
@@ -85,3 +85,13 @@ def holds(box: Box, key: int) -> bool:
 def size(box: Box) -> int:
     """Return the number of keys in the box."""
     return sum(high - low + 1 for low, high in box)
+
+
+def boxes_of(tests: Iterable[Test | None]) -> dict[str, Box]:
+    """Return for each leaf of which cells of a line speak alone the keys that all of them admit."""
+    boxes: dict[str, Box] = {}
+    for test in tests:
+        if test is not None and test.box is not None:
+            name = str(test.variables[0])
+            boxes[name] = meet(boxes[name], test.box) if name in boxes else test.box
+    return boxes

@@ -1,6 +1,6 @@
-"""Walks over expressions and statements: their parts, the same with other parts, and the leaves that they read and write."""
+"""Walks over expressions and statements: their parts, the same with other parts, and the leaves that they read and write; free names."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from math import isfinite
 from typing import assert_never
@@ -202,3 +202,16 @@ def written_by(statement: Statement) -> tuple[VariableName, ...]:
             return leaves
         case ToLocal():
             return ()
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return the name, or the first of `NAME_2`, `NAME_3` that is not taken; for an array element numbered before the index.
+
+    >>> free_name("go", {"go", "go_2"}), free_name("at[1]", {"at[1]"})
+    ('go_3', 'at_2[1]')
+    """
+    base, bracket, rest = name.partition("[")
+    number, free = 2, name
+    while free in taken:
+        free, number = f"{base}_{number}{bracket}{rest}", number + 1
+    return free

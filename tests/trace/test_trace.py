@@ -71,7 +71,7 @@ SHIPPED = [
 def test_all_shipped_code_is_traced_and_each_case_is_of_the_line_that_its_comment_names(path: str) -> None:
     for plan in plans(str(REPO / path)):
         files = emitted(plan)
-        one = matrix(plan, files, ProgramFacts({}))
+        one = matrix(plan, ProgramFacts({}))
         assert one.untraced == ()
         texts = {name: text.splitlines() for name, text in files.items()}
         lines = {(line.table, line.name) for line in one.lines}
@@ -94,7 +94,7 @@ def test_all_shipped_code_is_traced_and_each_case_is_of_the_line_that_its_commen
 def test_code_for_all_of_the_language_is_traced(real: str) -> None:
     program = program_of(EVERYTHING.replace("{real}", real))
     plan = lower(ProvedProgram(program, seal_of_proof()))
-    one = matrix(plan, emitted(plan), ProgramFacts({}))
+    one = matrix(plan, ProgramFacts({}))
     assert one.untraced == ()
     assert {piece.origin.sort for piece in one.pieces} >= {*Sort} - {Sort.SYSTEM}
 
@@ -118,7 +118,7 @@ def test_code_that_nothing_in_the_tables_stands_for_is_told(
     monkeypatch.setattr(templates, "cache", None)
     monkeypatch.setattr(templates.loader, "get_source", planted)
     files = emitted(plan)
-    left = [where.rpartition(":") for where in matrix(plan, files, ProgramFacts({})).untraced]
+    left = [where.rpartition(":") for where in matrix(plan, ProgramFacts({})).untraced]
     told = {(name, files[name].splitlines()[int(at) - 1]) for name, _, at in left}
     assert told == {("c/door.h", "int other;"), ("c/door.c", "int other;"), ("python/door.py", "other = 1")}
 

@@ -30,21 +30,21 @@ bytes on every machine: no time, version or absolute path is in them. Trusted: a
 Modules, in the order the data flows: `lower` makes a `plan`; `decision` parts its lines by cuts; `identifiers` spells
 every name, free in its `scope`; `code_tree` is a small tree of code, which C and Python share, and its spelling in
 each; `translate` makes it of expressions and statements, the room `c` and `python` of whole files, by the templates
-of `rendering`, which keeps where each line of them comes from (`source_map`); `ranges` says what an analyser sees that
+of `rendering`, which keeps where each line of them comes from (`rendered`); `ranges` says what an analyser sees that
 keeps ranges alone: where that is too little, the C says what was proved. `generated` writes the files
 or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from rcsc.code.emit.c.c99 import emit_c, outward, rendered_c
 from rcsc.code.emit.plan import Plan
 from rcsc.code.emit.python import emit_python, rendered_python
-from rcsc.code.emit.rendering import Piece, Rendered
+from rcsc.code.emit.rendering import Rendered
 
-__all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted", "source_map"]
+__all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted", "rendered"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +70,10 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
 
 def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, str]:
     """Return the files of a plan in these languages, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in _rendered(plan, targets)}
+    return {file: made.text for file, made in rendered(plan, targets).items()}
 
 
-def source_map(plan: Plan) -> dict[str, tuple[Piece, ...]]:
-    """For each file of a plan where its lines come from, by path below the generated folder; nothing for what is no code."""
-    return {file: rendered.pieces for file, rendered in _rendered(plan, TARGETS)}
-
-
-def _rendered(plan: Plan, targets: Collection[str]) -> Iterator[tuple[str, Rendered]]:
-    for name, target in TARGETS.items():
-        if name in targets:
-            yield from target.rendered(plan).items()
+def rendered(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, Rendered]:
+    """Return the same files, each with where its lines come from; nothing for what is no code."""
+    made = (target.rendered(plan) for name, target in TARGETS.items() if name in targets)
+    return {file: text for files in made for file, text in files.items()}

@@ -37,9 +37,8 @@ from rcsc.code.testing.executors.reference_file import reference_c
 from rcsc.code.testing.executors.shim import WORDS, set_leaves_c
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.interpret import holds, matching_lines
-from rcsc.lang.interval_sets import meet
+from rcsc.lang.interval_sets import boxes_of
 from rcsc.lang.model import (
-    Box,
     Line,
     Program,
     Real,
@@ -214,7 +213,7 @@ class MatcherCheck:
         Where it is calm, the others keep their initial values; else they are on edges, half of them beside what they are
         compared with.
         """
-        boxes = _boxes(line)
+        boxes = boxes_of(line.tests)
         keys: dict[str, int] = {}
         for variable in self.program.variables:
             if calm and variable.name not in boxes:
@@ -255,20 +254,10 @@ class MatcherCheck:
         low, high = key_bounds(leaf.type)
         if high - low < EVERY_KEY and not isinstance(leaf.type, Real):
             return list(range(low, high + 1))
-        boxes = (_boxes(line).get(leaf.name, ()) for line in self.table.lines)
+        boxes = (boxes_of(line.tests).get(leaf.name, ()) for line in self.table.lines)
         ends = {end for box in boxes for ends in box for end in ends}
         near = {end + step for end in ends for step in (-1, 0, 1)} | {low, high}
         return sorted(key for key in near if low <= key <= high)
-
-
-def _boxes(line: Line) -> dict[str, Box]:
-    """For each leaf that cells of the line state alone, the keys that they admit."""
-    boxes: dict[str, Box] = {}
-    for test in line.tests:
-        if test is not None and test.box is not None:
-            name = str(test.variables[0])
-            boxes[name] = meet(boxes[name], test.box) if name in boxes else test.box
-    return boxes
 
 
 def _firsts(index: Direct | Coded | Cuts) -> list[int]:

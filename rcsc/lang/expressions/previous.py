@@ -15,7 +15,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import MOST_LEAVES, Held, Scope
-from rcsc.lang.leaves import one_earlier, parts, read_by, renamed
+from rcsc.lang.leaves import free_name, one_earlier, parts, read_by, renamed
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Action,
@@ -228,13 +228,9 @@ def _type_at(scope: Scope, path: str) -> Type:
 
 
 def fresh(scope: Scope, name: str) -> str:
-    """Return the name, or the first of `NAME_2`, `NAME_3` that nothing else has."""
+    """Return the name, or the first numbered one that nothing else has."""
     taken = {*scope.leaves, *(kept.name for kept in scope.kept), *scope.declared, *scope.variables}
-    taken |= {*scope.constants, *scope.members, *scope.types}
-    number, unique = 2, name
-    while unique in taken:
-        unique, number = f"{name}_{number}", number + 1
-    return unique
+    return free_name(name, taken | {*scope.constants, *scope.members, *scope.types})
 
 
 def keeping(scope: Scope, names: set[str], span: Span) -> Procedure | None:
@@ -247,9 +243,7 @@ def keeping(scope: Scope, names: set[str], span: Span) -> Procedure | None:
     """
     if not scope.previous and not scope.held:
         return None
-    number, own = 2, KEEP
-    while own in names:
-        own, number = f"{KEEP}_{number}", number + 1
+    own = free_name(KEEP, names)
     body = (
         *(_count(held) for held in scope.held.values()),
         *(

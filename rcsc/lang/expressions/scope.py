@@ -8,6 +8,7 @@ from typing import TypeAlias
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
+from rcsc.lang.leaves import free_name
 from rcsc.lang.model import (
     Declared,
     Enum,
@@ -260,10 +261,7 @@ class Body:
     taken: set[str] = field(default_factory=set)
 
     def fresh(self, name: str) -> str:
-        """Return `name`, or the first of `name_2`, `name_3` that no other local has, and take it."""
-        unique, number = name, 1
-        while unique in self.taken:
-            number += 1
-            unique = f"{name}_{number}"
+        """Return the name, or the first numbered one that no other local has, and take it."""
+        unique = free_name(name, self.taken)
         self.taken.add(unique)
         return unique

@@ -25,7 +25,6 @@ each reads values of this cycle, and the order in which they are written means n
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, count
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Label
@@ -34,7 +33,7 @@ from rcsc.lang.expressions.previous import fresh
 from rcsc.lang.expressions.scope import Body, Scope, spell_number
 from rcsc.lang.expressions.typed import typed
 from rcsc.lang.expressions.types import constant
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import free_name, read_by
 from rcsc.lang.model import (
     Assumption,
     Declared,
@@ -359,9 +358,7 @@ def _members(lines: Sequence[str]) -> Iterator[str]:
     taken = set(lines)
 
     def free(word: str) -> str:
-        name = next(
-            name for name in chain((word,), (f"{word}_{number}" for number in count(2))) if name not in taken
-        )
+        name = free_name(word, taken)
         taken.add(name)
         return name
 

@@ -21,7 +21,7 @@ from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.expressions.words import Mask, mask_of
-from rcsc.lang.interval_sets import meet
+from rcsc.lang.interval_sets import boxes_of, meet
 from rcsc.lang.leaves import is_finite, read_by
 from rcsc.lang.model import (
     Apply,
@@ -305,7 +305,7 @@ class _Lines:
     shared: dict[Expr, Test] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.boxes = [self._box(line) for line in self.lines]
+        self.boxes = [boxes_of(line.tests) for line in self.lines]
         self.masks = [
             [
                 mask
@@ -315,13 +315,6 @@ class _Lines:
             for line in self.lines
         ]
         self.rows = {row.name: row for row in self.written.rows}
-
-    def _box(self, line: Line) -> dict[str, Box]:
-        boxes: dict[str, Box] = {}
-        for test in line.tests:
-            if test is not None and test.box is not None:
-                boxes[test.variables[0]] = meet(boxes.get(test.variables[0], test.box), test.box)
-        return boxes
 
     def reports_endless(self) -> bool:
         """Report a line without conditions that goes before others; return whether there is one."""

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, count, pairwise
 
+from rcsc.lang.leaves import free_name
 from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
 
 _HEAD = re.compile(
@@ -168,5 +169,4 @@ def fresh_name(names: Collection[str], above: str = "") -> str:
     letters = (
         map(chr, range(ord(above) + 1, ord("Z" if above.isupper() else "z") + 1)) if single else iter(())
     )
-    others = (f"{NEW_LINE}_{number}" for number in count(2))
-    return next(name for name in chain(numbers, letters, (NEW_LINE,), others) if name not in names)
+    return next((name for name in chain(numbers, letters) if name not in names), free_name(NEW_LINE, names))

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import prod
 from typing import Any, TypeAlias
 
-from rcsc.lang.interval_sets import meet
+from rcsc.lang.interval_sets import boxes_of
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Box, Program, Snapshot, Table, TableName, Test, key_bounds
@@ -135,11 +135,8 @@ def _box_lines(
     telling = {id(test) for test in _tests(table, extents)}
     lines = []
     for line in table.lines:
-        boxes: dict[int, Box] = {}
-        for test in line.tests:
-            if test is not None and test.box is not None and id(test) in telling:
-                column = names.index(test.variables[0])
-                boxes[column] = meet(boxes[column], test.box) if column in boxes else test.box
+        told = boxes_of(test for test in line.tests if id(test) in telling)
+        boxes = {names.index(name): box for name, box in told.items()}
         if all(boxes.values()):
             lines.append(boxes)
     return lines

@@ -19,7 +19,7 @@ to a system, and `beside` has its C and the Python system do it, tick by tick.
 
 from rcsc.run.link.beside import Beside, run_beside
 from rcsc.run.link.drawn_script import drawing, script
-from rcsc.run.link.system_c import emit_system, outward, system_map
+from rcsc.run.link.system_c import emit_system, outward, rendered_system
 from rcsc.run.link.wiring import Linked, linked, system_word
 
 __all__ = [
@@ -29,8 +29,8 @@ __all__ = [
     "emit_system",
     "linked",
     "outward",
+    "rendered_system",
     "run_beside",
     "script",
-    "system_map",
     "system_word",
 ]

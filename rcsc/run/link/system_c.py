@@ -29,7 +29,7 @@ from rcsc.code.emit.code_tree import (
 )
 from rcsc.code.emit.identifiers import TRACE, comment, constant_word, guard
 from rcsc.code.emit.plan import Origin, Sort
-from rcsc.code.emit.rendering import Piece, Rendered, render
+from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.translate import constant
 from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
 from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Standing, Start, adoption
@@ -44,15 +44,11 @@ TICKS, FIRST = Name(f"s->{TICK}"), Constant(0, "uint64_t")
 
 def emit_system(system: Linked) -> dict[str, str]:
     """Return the files of a system, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in _rendered(system).items()}
+    return {file: made.text for file, made in rendered_system(system).items()}
 
 
-def system_map(system: Linked) -> dict[str, tuple[Piece, ...]]:
-    """Return for each of the files where its lines come from: from the system's description, but for what is for the compiler."""
-    return {file: rendered.pieces for file, rendered in _rendered(system).items()}
-
-
-def _rendered(system: Linked) -> dict[str, Rendered]:
+def rendered_system(system: Linked) -> dict[str, Rendered]:
+    """Return the files, and where their lines come from: from the system's description, but for what is for the compiler."""
     maker = _Maker(system)
     view = maker.view()
     forms = {

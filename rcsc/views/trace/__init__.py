@@ -3,8 +3,8 @@
 In: proved programs, their emitted files, test vectors and verdicts. Out: a matrix of each program, as data, as a page, as CSV and
 JSON, and findings: code that comes from nothing, requirements without a place, a kept matrix of another version.
 
-The emitter says where each line of C and Python comes from (`emit.source_map`, `link.system_map`). Every line of C that is not blank, and
-every line of Python, lies in a piece with an origin, or is a finding.
+The emitter says where each line of C and Python comes from (`emit.rendered`, `link.rendered_system`). Every line of C that is not blank,
+and every line of Python, lies in a piece with an origin, or is a finding.
 
 >>> from rcsc.code.emit.plan import Origin, Sort
 >>> Origin(Sort.LINE, "acquire", "3").words

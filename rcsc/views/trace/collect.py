@@ -4,6 +4,7 @@ In: settings. Out: matrices, and a conclusion.
 """
 
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.cache import Cache, open_cache
 from rcsc.base.host.files import write_atomically
 from rcsc.base.host.files.read import Malformed, json_of, text
-from rcsc.code.emit import TARGETS, emitted
+from rcsc.code.emit.plan import Plan
 from rcsc.driver.compile import Generated, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings
@@ -87,8 +88,10 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
     if report.failed:
         return Traced(Conclusion(report, "nothing was traced: not everything is proved"))
     cache = open_cache(Path(project_root(str(project.executable[0][0])))) if project.executable else None
-    matrices = [_matrix(project, program, settings, wanted, cache) for _, program in project.executable]
-    matrices += [_of_system(project, path) for path in systems]
+    plans = [(root, planned(program), program) for root, program in project.executable]
+    matrices = [_matrix(project, plan, program, settings, wanted, cache) for _, plan, program in plans]
+    by_root = {os.path.realpath(root): plan for root, plan, _ in plans}
+    matrices += [_of_system(by_root, path) for path in systems]
     settings.progress("")
     found = [*_untraced(matrices)]
     if wanted.requirements is not None:
@@ -99,10 +102,14 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
 
 
 def _matrix(
-    project: Proved, program: ProvedProgram, settings: Settings, wanted: Wanted, cache: Cache | None
+    project: Proved,
+    plan: Plan,
+    program: ProvedProgram,
+    settings: Settings,
+    wanted: Wanted,
+    cache: Cache | None,
 ) -> Matrix:
     settings.progress(f"tracing {program.program.file}")
-    plan = planned(program)
     [proof] = [proof for proof in project.proofs if proof.proved is program]
     known = ProgramFacts(
         table_proofs(proof.tables),
@@ -111,18 +118,14 @@ def _matrix(
         {} if cache is None else property_proofs(program.program, cache),
         project.loaded.sources,
     )
-    return matrix(plan, emitted(plan), known)
+    return matrix(plan, known)
 
 
-def _of_system(project: Proved, path: Path) -> Matrix:
-    """The C of a whole system, which is made of its description."""
-    generated = Generated(tuple(TARGETS), defensive=False)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    before = set(generated.files)
+def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
+    """Build the matrix of the C of a whole system, which is made of its description."""
+    generated = Generated(("c",), defensive=False, plans=plans)
     generated.add_system(path)
-    own = {name: text for name, text in generated.files.items() if name not in before}
-    return of_system(generated.systems[path], str(path), own)
+    return of_system(generated.systems[path], str(path))
 
 
 def _untraced(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:

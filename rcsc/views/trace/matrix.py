@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.base.diagnostics.source import Source, Span
-from rcsc.code.emit import source_map
+from rcsc.code.emit import rendered
 from rcsc.code.emit.plan import Origin, Plan, PlanLine, PlanTable, Sort
-from rcsc.code.emit.rendering import Piece
+from rcsc.code.emit.rendering import Piece, Rendered
 from rcsc.code.testing.coverage.document import VectorSet
 from rcsc.code.testing.coverage.lines import TakenLine, taken
 from rcsc.code.testing.inputs.condition_text import words
@@ -28,7 +28,7 @@ from rcsc.lang.model import (
     Property,
     Statement,
 )
-from rcsc.run.link import Linked, system_map
+from rcsc.run.link import Linked, rendered_system
 
 OWES_NOTHING = "proved: it owes nothing"
 KEPT = "proved: every cycle keeps it"
@@ -200,10 +200,10 @@ class ProgramFacts:
     sources: Mapping[str, Source] = field(default_factory=dict)
 
 
-def matrix(plan: Plan, files: Mapping[str, str], known: ProgramFacts) -> Matrix:
-    """Build the matrix of a program from its plan, its emitted files and what is known of it."""
-    code = {path: text for path, text in files.items() if path.endswith((".c", ".h", ".py"))}
-    pieces = tuple(_pieces(plan, code))
+def matrix(plan: Plan, known: ProgramFacts) -> Matrix:
+    """Build the matrix of a program from its plan and what is known of it."""
+    files = rendered(plan)
+    code, pieces = _code(files, ".c", ".h", ".py")
     build = _Build(plan, known)
     return Matrix(
         plan.program.name,
@@ -220,24 +220,24 @@ def matrix(plan: Plan, files: Mapping[str, str], known: ProgramFacts) -> Matrix:
     )
 
 
-def of_system(system: Linked, source: str, files: Mapping[str, str]) -> Matrix:
+def of_system(system: Linked, source: str) -> Matrix:
     """Build the matrix of the C of a whole system, all of which comes from its description."""
-    name, maps = system.word, system_map(system)
-    code = {path: text for path, text in files.items() if path.endswith((".c", ".h"))}
-    pieces = tuple(piece for path in code for piece in maps[path])
+    name, files = system.word, rendered_system(system)
+    code, pieces = _code(files, ".c", ".h")
     hashed = _hashed(files)
     return Matrix(name, source, digest(*sorted(hashed.values())), hashed, {}, (), (), {}, pieces, tuple(untraced(code, pieces)),
         {(Sort.SYSTEM, name): source})  # fmt: skip
 
 
-def _hashed(files: Mapping[str, str]) -> dict[str, str]:
-    return {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
+def _hashed(files: Mapping[str, Rendered]) -> dict[str, str]:
+    return {path: hashlib.sha256(made.text.encode()).hexdigest() for path, made in files.items()}
 
 
-def _pieces(plan: Plan, code: Mapping[str, str]) -> Iterator[Piece]:
-    maps = source_map(plan)
-    for path in code:
-        yield from maps[path]
+def _code(files: Mapping[str, Rendered], *ends: str) -> tuple[dict[str, str], tuple[Piece, ...]]:
+    """Return the texts of the files with these endings, and the pieces of all of them."""
+    code = {path: made for path, made in files.items() if path.endswith(ends)}
+    pieces = tuple(piece for made in code.values() for piece in made.pieces)
+    return {path: made.text for path, made in code.items()}, pieces
 
 
 def untraced(code: Mapping[str, str], pieces: Iterable[Piece]) -> Iterator[str]:
