@@ -576,7 +576,7 @@ def test_a_system_that_is_not_wholly_proved_says_what_rests_on_what(
     verdict, _, rest = capsys.readouterr().out.partition("\n")
     assert verdict.startswith("proved in part: ")
     assert verdict.endswith("status 0, and 1 with --strict")
-    many = re.search(r"(\d+) claims resting on what is not known", verdict)
+    many = re.search(r"(\d+) claims resting on unproved ones", verdict)
     assert many is not None
     assert int(many[1]) > 3
     assert "rest on level `lower`, which was not looked at" in rest

@@ -356,15 +356,19 @@ def test_what_starts_with_what() -> None:
     [
         (
             "state n : int 1 .. 9",
-            "`n` starts: 0 is not in 1 .. 9, so that it is 1",
+            "`n` has no declared start value: 0 is not in 1 .. 9, so it starts with 1",
             "its type, such as `= 1`",
         ),
-        ("input n : int -9 .. -2 [mm] clamp", "0 is not in -9 .. -2, so that it is -2", "such as `= -2`"),
-        ("output x : single 0.5 .. 1.5", "0 is not in 0.5 .. 1.5, so that it is 0.5", "such as `= 0.5`"),
-        ("state a : array[300] of int 1 .. 2", "`a[0]` starts: 0 is not in 1 .. 2", "after its type, such"),
+        ("input n : int -9 .. -2 [mm] clamp", "0 is not in -9 .. -2, so it starts with -2", "such as `= -2`"),
+        ("output x : single 0.5 .. 1.5", "0 is not in 0.5 .. 1.5, so it starts with 0.5", "such as `= 0.5`"),
+        (
+            "state a : array[300] of int 1 .. 2",
+            "`a[0]` has no declared start value: 0 is not in 1 .. 2",
+            "after its type, such",
+        ),
         (
             "record r { f : array[2] of real -2.0 .. -1.0 } state a : array[2] of r",
-            "`a[0].f[0]` starts: 0 is not in -2.0 .. -1.0",
+            "`a[0].f[0]` has no declared start value: 0 is not in -2.0 .. -1.0",
             "after the type of field `f`, such as `= -1.0`",
         ),
     ],

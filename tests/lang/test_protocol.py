@@ -610,7 +610,7 @@ def test_levels_without_a_superior_and_without_subordinates_are_levels() -> None
         ("command : job rest", "command : jobb rest", "RCS201", "no enumeration is called `jobb`"),
         ("else silent", "else silence", "RCS201", "no reason is called `silence`"),
         ("  report { reason why", "  report { why", "RCS301", "no `reason`"),
-        ("reason why : why restart begun_anew", "reason why : bool", "RCS301", "of an enumeration"),
+        ("reason why : why restart begun_anew", "reason why : bool", "RCS301", "needs an enumeration"),
         (
             "order { width_mm",
             "order { input_command : bool  width_mm",

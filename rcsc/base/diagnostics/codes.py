@@ -465,7 +465,7 @@ class Code(StrEnum):
         }
         level task { period 40 [ms] preprocess sense table t }
     """
-    UNSTEADY_SELECTOR = """RCS214: what chooses the table may change after it was chosen
+    UNSTEADY_SELECTOR = """RCS214: the variable that chooses the table may change later in the cycle
 
     The variable after `table by` chooses the table after the preprocess. A line, the postprocess or a safe value that changed it would
     leave a state that shows another table than the one that ran: logs, runs that `rcsc prove` finds and the shell could not say which
@@ -909,16 +909,16 @@ class Code(StrEnum):
         }
         level watch { period 40 [ms] table watches }
     """
-    NO_START = """RCS318: a number of which nothing says with what it starts
+    NO_START = """RCS318: a number without a declared start value
 
-    A number starts at 0, an output with a safe value at that. Where 0 is not in its range it starts with what is nearest to 0, which
-    nobody may have meant. A warning: say with what it starts, after the type of the variable, or of the field of its record or link.
+    A number starts at 0, an output with a safe value at that. Where 0 is not in its range it starts with the value nearest to 0, which
+    nobody may have meant. A warning: declare a start value, after the type of the variable, or of the field of its record or link.
 
         record gains { p : real 0.1 .. 9.0 }
         state speed : int 1 .. 9 = 3
         state gain : gains
 
-    warning: nothing says with what `gain.p` starts: 0 is not in 0.1 .. 9.0, so that it is 0.1
+    warning: `gain.p` has no declared start value: 0 is not in 0.1 .. 9.0, so it starts with 0.1
 
         record gains { p : real 0.1 .. 9.0 = 1.0 }
         state speed : int 1 .. 9 = 3
@@ -1152,7 +1152,7 @@ class Code(StrEnum):
           | high | > 5 || false |
         }
     """
-    DEFAULT_COVERS = """RCS407: what falls to the DEFAULT line
+    DEFAULT_COVERS = """RCS407: inputs that fall to the DEFAULT line
 
     A note, not an error: DEFAULT hides gaps, so rcsc says which inputs fall to it and, where that can be counted, what share of
     all they are. Declare the line `DEFAULT unreachable` where nothing should.
@@ -1410,7 +1410,7 @@ class Code(StrEnum):
           | runs             | false | false || 9     |
         }
     """
-    NEVER_MEET = """RCS423: what is said of two lines is of no input
+    NEVER_MEET = """RCS423: `above` or `same` between lines that never match together
 
     `above` says which line runs, and `same` that it does not matter which, where two lines match together. These never do, under the
     declared ranges, the invariants and what the table assumes: what their author meant is not what their conditions say.
@@ -1692,7 +1692,7 @@ class Code(StrEnum):
     A module, procedure or table that is run by itself met what the proofs exclude within a cycle: a division by zero, an index outside
     an array, a value out of its variable's range. Nothing was changed. Set what it reads first, or run the whole level.
     """
-    SHELL_EXPECTED = """RCS736: what was expected does not hold
+    SHELL_EXPECTED = """RCS736: an expected condition is false
 
     `expect CONDITION` in a script of the shell: the condition is false now. The message shows the variables that it is about. The
     script was stopped here.
@@ -1740,7 +1740,7 @@ class Code(StrEnum):
     --again FOLDER` runs again, its script, and of a campaign its log for `rcsc replay`. What a fault explains that breaks the
     contract between levels, an older value that comes again, is no such finding.
     """
-    WORKERS_GONE = """RCS744: nobody is left to play
+    WORKERS_GONE = """RCS744: no worker is left to play episodes
 
     The workers of a campaign are gone and cannot be had again: the scheduler does not answer, or it lost them, or they have other
     tables or programs than the campaign. What was done is kept in the journal; the same command goes on from there.
@@ -1760,7 +1760,7 @@ class Code(StrEnum):
     DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a warning, as long as nothing that was looked at has changed:
     the tables by themselves may well be proved.
     """
-    NOT_AGREED = """RCS752: a level assumes what its neighbour does not keep
+    NOT_AGREED = """RCS752: a level assumes more than its neighbour keeps
 
     What a level assumes of the level above or below is matched with what was proved of that level: that a report echoes the command it
     answers, that an order changes only together with its number, and that both begin in agreement. Here it was not proved of the
@@ -1781,10 +1781,10 @@ class Code(StrEnum):
     ENDLESS = """RCS756: a command is not shown to end
 
     Every command is to end if every order that is not replaced is answered. For this table that is not shown: the lines named may run
-    for ever, or its states may go round. The run, where there is one, ends as it was before the cycle named, with every order answered
-    or followed by another, so that it may go on for ever. It is a warning: a line may wait for what nobody in the system brings about,
-    and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a number that rises with
-    the line, and that no other line sets back, shows that it ends.
+    for ever, or a loop of states may never answer it. The run, where there is one, ends as it was before the cycle named, with every
+    order answered or followed by another, so that it may go on for ever. It is a warning: a line may wait for what nobody in the system
+    brings about, and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a number
+    that rises with the line, and that no other line sets back, shows that it ends.
     """
     BAD_START = """RCS757: runs cannot begin so
 
@@ -1809,7 +1809,7 @@ class Code(StrEnum):
           shut --> open : 1 [button] command_out(lift)
           open --> shut : 2 [not button and clear] command_out(drop)
     """
-    GRAPH_DIFFERS = """RCS773: a graph does not say the table
+    GRAPH_DIFFERS = """RCS773: a graph and its table differ in meaning
 
     The table made of the graph does not do what the present one does: for the input shown another line's worth of actions runs, or none
     does, or two lines match. If the graph was changed on purpose, that is the change; `rcsc diff` shows all of it. A graph that `rcsc

@@ -46,7 +46,7 @@ def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
         path = Path(folder) / name
         try:
             fresh = _content(path) == text.encode()
-            message = f"`{path}` is not what the tables say"
+            message = f"`{path}` differs from the code of the tables"
         except OSError:
             fresh, message = False, f"`{path}` is missing"
         if not fresh:

@@ -86,7 +86,10 @@ class Ending:
         """The loops and lines that may go on for ever, in words."""
         lines = ", ".join(f"`{line}`" for line in self.endless)
         again = f"{'line' if len(self.endless) == 1 else 'lines'} {lines} may run for ever"
-        return (*(f"it may go round: {loop}" for loop in self.loops), *([again] if lines else []))
+        return (
+            *(f"the command may stay in a loop: {loop}" for loop in self.loops),
+            *([again] if lines else []),
+        )
 
     @property
     def proved(self) -> bool:

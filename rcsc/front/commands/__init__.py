@@ -102,7 +102,7 @@ def _bug(error: Exception) -> int:
     if isinstance(error, WorkerEndedError):
         click.echo(
             f"error[RCS904]: {error}\n"
-            "  = note: nothing is known of what it was to decide\n"
+            "  = note: the question that it worked on is undecided\n"
             "  = help: if memory was short, `--jobs 1` takes less of it",
             err=True,
         )

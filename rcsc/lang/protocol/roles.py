@@ -331,7 +331,7 @@ def _misplaced(link: tree.LinkDecl, enums: Mapping[str, tuple[str, ...]]) -> Ite
                 isinstance(part.type, tree.NamedType) and part.type.name.text in enums
             ):
                 yield (
-                    "a reason is of an enumeration; its first member says that there is none",
+                    "a reason needs an enumeration, whose first member means that there is none",
                     part.name.span,
                 )
             if part.restart is not None and parts is link.order:

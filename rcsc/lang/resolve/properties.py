@@ -100,12 +100,14 @@ class _Form:
 
 
 _FORMS = {
-    "then": _Form(_then, "what stands before `then` is of the cycle before as it is", ""),
+    "then": _Form(
+        _then, "the left side of `then` looks one cycle back itself, and cannot look back further", ""
+    ),
     "until": _Form(
-        _until, "what stands before `until` is of one cycle", "what stands behind `until` is of one cycle"
+        _until, "the left side of `until` cannot look back", "the right side of `until` cannot look back"
     ),
     "upon": _Form(
-        _upon, "what stands before `upon` is of one cycle", "what stands after `upon` is of one cycle"
+        _upon, "the left side of `upon` cannot look back", "the right side of `upon` cannot look back"
     ),
 }
 

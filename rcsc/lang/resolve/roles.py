@@ -167,7 +167,9 @@ def _leaf(scope: Scope, place: tree.Expr) -> Variable | None:
     if written is None:
         return None
     if not isinstance(written.expr, Read):
-        scope.report(Code.KIND, "what a level adopts is of one scalar", place.span)
+        scope.report(
+            Code.KIND, "a level adopts a scalar: a variable, or one field or element of it", place.span
+        )
         return None
     return scope.leaves[written.expr.name]
 

@@ -127,7 +127,10 @@ def write_vectors(
         if file is None:
             continue
         if file.suffix in ALONE and len(sets) != 1:
-            yield _unwritten(file, f"a {ALONE[file.suffix]} file holds what is of one program")
+            yield _unwritten(
+                file,
+                f"a {ALONE[file.suffix]} file holds the vectors of one program, and there are {len(sets)}",
+            )
             continue
         try:
             write_atomically(file, text_of(file.suffix, sets).encode())

@@ -300,7 +300,7 @@ class Live(Concern):
         if line.split("#")[0].strip() in {"quit", "clear"}:
             raise Refused(
                 Code.STUDIO,
-                "that is of a terminal",
+                "the page has no such command: it is one of the shell in a terminal",
                 "close the page, or press Ctrl-C where `rcsc studio` runs",
             )
         if commands.proves_together(line):
@@ -515,4 +515,4 @@ def ended(system: System) -> str:
             "the script is at its end" if stopped is None else f"row {stopped.row.number}: {stopped.reason}"
         )
     others = (part for part in system.outside if part is not operator)
-    return "what stands outside is at its end" if any(getattr(part, "over", False) for part in others) else ""
+    return "the plant has ended" if any(getattr(part, "over", False) for part in others) else ""

@@ -221,7 +221,7 @@ def _table_of(program: Program | None, name: str, ask: Ask) -> tuple[Program, Ta
     """
     ask.check()
     if program is None:
-        raise Refused(Code.STUDIO, "the text is not in order as it is: mend what is found in it first")
+        raise Refused(Code.STUDIO, "the text has errors: mend them first")
     table = next((each for each in program.tables if each.name == name), None)
     if table is None:
         raise Refused(Code.STUDIO, f"the text has no table `{name}`")

@@ -103,7 +103,7 @@ def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
     )
     rests = "" if seen.repeated or seen.restless else standing(whole, level, (AGAIN, "", ""))
     only = f" ({rests})" if rests not in {"", "proved"} else ""
-    yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}{only}"
+    yield f"effects of lines that match again before their order is echoed: {again or 'none'}{only}"
     if seen.restless:
         yield "order after order may be given on inputs that stay the same"
 
@@ -185,7 +185,7 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
     contexts = [level.context for level in whole.levels if level.context is not None]
     counts = {
         "not looked at": sum(missing.applies for level in whole.levels for missing in level.unstated),
-        "resting on what is not known": sum(map(len, _resting(whole).values())),
+        "resting on unproved ones": sum(map(len, _resting(whole).values())),
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),
     }
@@ -197,7 +197,7 @@ def left_out(whole: SystemProof) -> Iterator[str]:
     """Yield the claims that rest on unproved ones, with those."""
     resting = _resting(whole) if whole.proved else {}
     if resting:
-        yield "resting on what is not known"
+        yield "resting on unproved ones"
     for lacks, claims in resting.items():
         yield f"  {report.named(claims)}: {'rests' if len(claims) == 1 else 'rest'} on {lacks}"
 

@@ -284,7 +284,7 @@ def _together(known: InSystem) -> Iterator[str]:
 
 def _of_system(system: SystemReport) -> str:
     command = f"`rcsc prove {escape(system.system)}`"
-    return f"whether the levels together keep what these tables assume is not known: {command} decides it"
+    return f"the assumptions of these tables are not proved of the levels together: {command} decides them"
 
 
 def _missing(system: SystemReport) -> str:

@@ -79,7 +79,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
     "--json", "json_", type=_TO, default=None, metavar="FILE", help="Write the summary to FILE, too."
 )
 @click.option("--limit", "limit_s", type=click.FloatRange(min=0, min_open=True), default=120.0, show_default=True,
-              metavar="SECONDS", help="What takes longer hangs.")  # fmt: skip
+              metavar="SECONDS", help="Most seconds of an episode: one that takes longer counts as hung.")  # fmt: skip
 @click.option("--scheduler", default=None, metavar="ADDRESS",
               help="Play on the workers of this dask.distributed scheduler; they have the same rcsc and tables.")  # fmt: skip
 @click.option("--again", type=click.Path(exists=True, path_type=Path), default=None, metavar="FILE",

@@ -87,7 +87,7 @@ def _no_run(ts: TransitionSystem, explanation: Explanation, cycles: int) -> str:
     """Report that no run was found, or that none was looked for."""
     among = " among those in which no input is refused" if ts.refusable else ""
     gave_up = "; the solver gave up on some" if explanation.gave_up else ""
-    return f"no run of {cycles} cycles or fewer was found{among}{gave_up}"
+    return f"no run of {cycles} cycles or fewer was found{among}{gave_up}; `--trace N` looks for longer ones"
 
 
 def _say_logs(explanation: Explanation) -> None:

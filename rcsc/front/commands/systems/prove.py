@@ -58,9 +58,9 @@ Examples:
               help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--progress", is_flag=True,
-              help="Say each level on standard error as it is done, which is so on a terminal anyway.")  # fmt: skip
+              help="Print each level on standard error once it is done; a terminal always shows it.")  # fmt: skip
 @click.option("--strict", is_flag=True,
-              help="Exit status 1 also where something was not looked at, or rests on what is not proved.")  # fmt: skip
+              help="Exit with status 1 also where a claim was not looked at, or rests on an unproved one.")  # fmt: skip
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options

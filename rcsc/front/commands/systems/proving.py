@@ -256,7 +256,7 @@ def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> 
             for leaf in declared.leaves
         }
         if condition := as_condition(level.predicates, level.clauses, own):
-            yield "of it, what a program can say of its own values:"
+            yield "the part about its own values, as a declaration for its program:"
             yield f"  invariant of_{level.level} : {condition}"
 
 

@@ -92,7 +92,7 @@ Examples:
 @EXECUTOR
 @DATABASE
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
-              help="Of what is random in the plant; the same seed gives the same log.")  # fmt: skip
+              help="Seed of the plant's random numbers; the same seed gives the same log.")  # fmt: skip
 @click.option("--fault", "faults", multiple=True, metavar="NAME",
               help="A fault of the plant that is on from the first cycle (repeatable).")  # fmt: skip
 @click.option("--cycles", type=click.IntRange(min=1), default=None, metavar="N",

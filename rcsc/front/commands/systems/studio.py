@@ -39,7 +39,7 @@ Examples:
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
-              help="Of what is random in the plant.")  # fmt: skip
+              help="Seed of the plant's random numbers.")  # fmt: skip
 @click.option("--log", "logs", multiple=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE",
               help="A log to look at, wherever it lies (repeatable); the first is shown at once.")  # fmt: skip
 @click.option(

@@ -2,7 +2,7 @@
 
 In: a program, and the texts that it was made of. Out: a warning for each state and input of the root file of which nothing reads any part,
 for each constant that nothing uses, and for each member of an enumeration that nothing gives or asks for; and for each variable of the
-whole program of which nothing says with what it starts.
+whole program without a declared start value.
 
 Of what nobody reads only the root file is judged, and only where it has a table or a level: what a vocabulary declares is for whoever uses
 it. Outputs are for whoever takes them, with the members that they may have; members of an input, of a link or of what an extern procedure
@@ -72,7 +72,7 @@ def _warning(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
 
 
 def declared_badly(program: Program) -> Iterator[Diagnostic]:
-    """Yield a warning for each variable of which nothing says with what it starts, wherever it is declared."""
+    """Yield a warning for each number without a start value, declared or 0, wherever it is declared."""
     leaves = {variable.name: variable for variable in program.variables}
     for declared in program.declared:
         unsaid = next((leaf for name in declared.leaves if _starts_unsaid(leaf := leaves[name])), None)
@@ -91,7 +91,7 @@ def _no_start(leaf: Variable) -> Diagnostic:
     assert isinstance(kind, Int | Real)
     value = spell(kind, leaf.initial)
     ends = f"{spell(kind, kind.low)} .. {spell(kind, kind.high)}"
-    message = f"nothing says with what `{leaf.name}` starts: 0 is not in {ends}, so that it is {value}"
+    message = f"`{leaf.name}` has no declared start value: 0 is not in {ends}, so it starts with {value}"
     part = leaf.name.rpartition(".")[2].partition("[")[0] if "." in leaf.name else ""
     where = f"the type of field `{part}`" if part else "its type"
     return _warning(
