@@ -116,7 +116,7 @@ class Digests:
         return leaves
 
     def _called(self, body: Iterable[Statement]) -> list[Procedure]:
-        """The procedures that run when the statements do, by name."""
+        """Return the procedures that run when the statements do, by name."""
         return [self.procedures[name] for name in sorted(closure(called_by(body), self.procedures))]
 
     def _rest(self, body: list[Statement], conditions: Iterable[Expr]) -> str:

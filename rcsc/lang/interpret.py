@@ -152,7 +152,7 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
 
 
 def fold(expr: Expr, values: Mapping[str, Value] | None = None) -> Value | None:
-    """The interpreter's value, reading leaves from `values`; None where something is missing or undefined."""
+    """Return the interpreter's value, reading leaves from `values`; None where something is missing or undefined."""
     try:
         return evaluate(expr, values or {})
     except (LookupError, ArithmeticError, ValueError):

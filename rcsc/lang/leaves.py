@@ -171,7 +171,7 @@ def called_by(body: Iterable[Statement]) -> Iterator[str]:
 
 
 def closure(called: Iterable[str], procedures: Mapping[str, Procedure]) -> set[str]:
-    """The procedures that run when these do."""
+    """Return the procedures that run when these do."""
     waiting, seen = list(called), set[str]()
     while waiting:
         name = waiting.pop()

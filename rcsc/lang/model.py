@@ -999,11 +999,11 @@ class Program:
         return {str(variable.name): variable.type for variable in self.variables}
 
     def table(self, name: str) -> Table:
-        """The table called `name`; StopIteration if there is none."""
+        """Return the table called `name`; StopIteration if there is none."""
         return next(table for table in self.tables if table.name == name)
 
     def assumed(self, table: Table) -> tuple[Assumption, ...]:
-        """The assumptions that the table's proof may use, in declared order."""
+        """Return the assumptions that the table's proof may use, in declared order."""
         return tuple(assumption for assumption in self.assumptions if assumption.name in table.assumptions)
 
     def variable(self, name: str) -> Variable:

@@ -56,7 +56,7 @@ class Cache:
         return result
 
     def load(self, kind: type[T], *parts: str) -> T | None:
-        """The result of this kind that was stored under the same parts; None where there is nothing to be believed."""
+        """Return the result of this kind that was stored under the same parts; None where there is none, or none to be believed."""
         key = self._key(kind, parts)
         try:
             seal, _, kept = content(self._path(key)).partition(b"\n")
@@ -106,13 +106,13 @@ class Cache:
 
 
 def open_cache(root: Path) -> Cache | None:
-    """The cache of the project at `root`, or in `RCSC_CACHE_DIR`; None where no secret can be kept."""
+    """Return the cache of the project at `root`, or in `RCSC_CACHE_DIR`; None where no secret can be kept."""
     secret = secret_of_user()
     return None if secret is None else Cache(_folder(root), secret, digest_of_tool())
 
 
 def cache_of(root: Path, like: Cache) -> Cache:
-    """The cache of another project; without asking again what rcsc is made of."""
+    """Return the cache of another project, without asking again for the files of rcsc itself."""
     return replace(like, folder=_folder(root))
 
 
@@ -122,7 +122,7 @@ def _folder(root: Path) -> Path:
 
 
 def secret_of_user() -> bytes | None:
-    """The user's secret, made at first use; `RCSC_CACHE_KEY` may name one that machines share."""
+    """Return the user's secret, made at first use; `RCSC_CACHE_KEY` may name one that machines share."""
     shared = os.environ.get("RCSC_CACHE_KEY")
     if shared:
         return hashlib.sha256(shared.encode()).digest()
@@ -159,7 +159,7 @@ def digest_of_tool() -> str:
 
 
 def _parts(package: Path) -> Iterator[str]:
-    """Every file that rcsc is made of."""
+    """Yield every file of rcsc itself."""
     folders = (package, package.parent / "grammar")
     for folder in folders:
         if folder.is_dir():
@@ -167,7 +167,7 @@ def _parts(package: Path) -> Iterator[str]:
 
 
 def _files_below(folder: str) -> Iterator[str]:
-    """The files in a folder and in those below it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
+    """Yield the files in a folder and in those below it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith((".py", ".lark", ".jinja", ".md")):
@@ -177,7 +177,7 @@ def _files_below(folder: str) -> Iterator[str]:
 
 
 def _provers() -> Iterator[tuple[str, bytes]]:
-    """What each installed prover is: its record, which has the digest of each of its files; of one without a record its first module."""
+    """Yield the identity of each installed prover: its record, with the digest of each of its files; without one, its first module."""
     for prover, project in _PROVERS.items():
         spec = find_spec(prover)
         if spec is None or spec.origin is None:

@@ -85,7 +85,7 @@ class _Keeper:
             self._tell(f"+{what}")
 
     def pipe(self) -> int:
-        """Where a child that has been forked names itself before it runs a program."""
+        """Return the pipe by which a forked child names itself before it runs a program."""
         with self._lock:
             self._own()
             self._tell("")
@@ -100,12 +100,12 @@ class _Keeper:
                 self._tell(f"-{what}")
 
     def held(self) -> tuple[str, ...]:
-        """What is held now."""
+        """Return the processes that are held now."""
         with self._lock:
             return tuple(self._held)
 
     def _own(self) -> None:
-        """A copy of the process that began the keeper begins one of its own."""
+        """Forget the keeper in a copy of the process that began it: the copy begins its own."""
         if self._maker != os.getpid():
             self._held, self._process, self._maker = {}, None, os.getpid()
 
@@ -136,7 +136,7 @@ class _Keeper:
 
 
 def _still(what: str) -> bool:
-    """Whether a number still means what was held: a process that has ended and was waited for may have left it to another."""
+    """Return whether a number still means the process that was held: one that has ended and was waited for may have left it to another."""
     kind, _, name = what.partition(" ")
     if kind != "process":
         return True
@@ -208,7 +208,7 @@ def _remove_unlocked(path: Path) -> None:
 
 
 def _scratch(kind: str) -> tuple[Path, int]:
-    """A temporary folder that goes when this process ends, and its lock."""
+    """Return a temporary folder that goes when this process ends, and its lock."""
     prefix, parent = f"rcsc-{kind}-", Path(tempfile.gettempdir())
     sweep(parent, prefix)
     held = None
@@ -221,7 +221,7 @@ def _scratch(kind: str) -> tuple[Path, int]:
 
 @contextlib.contextmanager
 def scratch(kind: str) -> Iterator[Path]:
-    """A temporary folder for work of this kind; it is gone after any end of this process."""
+    """Return a temporary folder for work of this kind; it is gone after any end of this process."""
     path, held = _scratch(kind)
     try:
         yield path
@@ -238,7 +238,7 @@ _folders: dict[int, tuple[Path, int]] = {}
 
 
 def _programs_folder() -> Path:
-    """The folder for what programs leave when they are killed; the keeper removes it when this process ends."""
+    """Return the folder for files that programs leave when they are killed; the keeper removes it when this process ends."""
     if os.getpid() not in _folders:
         _folders[os.getpid()] = _scratch("programs")
     return _folders[os.getpid()][0]
@@ -306,7 +306,7 @@ def _kill_group(group: int) -> None:
 
 
 def _prepared(memory_mb: int | None) -> Callable[[], None]:
-    """What a child does between fork and exec."""
+    """Prepare a child between fork and exec."""
     parent, keeper = os.getpid(), _keeper.pipe()
 
     def prepare() -> None:
@@ -379,7 +379,7 @@ def executor(workers: int, then: Callable[[], None] | None = None) -> "ProcessPo
 
 @contextlib.contextmanager
 def pool(workers: int) -> "Iterator[ProcessPoolExecutor]":
-    """An `executor` whose workers are killed when the block is left by an exception or an interrupt."""
+    """Return an `executor` whose workers are killed when the block is left by an exception or an interrupt."""
     processes = executor(workers)
     try:
         yield processes
@@ -409,7 +409,7 @@ def answer(future: Future[T]) -> T:
 
 
 def process(name: str, target: Callable[..., None], *args: Any) -> "SpawnProcess":
-    """A process of this program, for `start` to begin; it dies with this one."""
+    """Return a process of this program, for `start` to begin; it dies with this one."""
     from multiprocessing import get_context
 
     return get_context("spawn").Process(
@@ -418,7 +418,7 @@ def process(name: str, target: Callable[..., None], *args: Any) -> "SpawnProcess
 
 
 def pipe() -> "tuple[Connection, Connection]":
-    """The end that reads, and the one that a process is given to tell something."""
+    """Return a pipe: the end that reads, and the one that a process is given to write to."""
     from multiprocessing import Pipe
 
     return Pipe(duplex=False)

@@ -45,7 +45,7 @@ class BadFile(CodedError):  # noqa: N818  # what happened, not an error of ours
         super().__init__(text or "; ".join(self._line(diagnostic) for diagnostic in diagnostics))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As it is, from one process to another: classes below take other arguments."""
+        """Pass it as it is from one process to another: classes below take other arguments."""
         return type(self).__new__, (type(self), *self.args), self.__dict__
 
     def _line(self, diagnostic: Diagnostic) -> str:
@@ -170,7 +170,7 @@ Kind: TypeAlias = (
 
 
 def shown_path(path: KeyPath) -> str:
-    """A key path as a user would write it; elements of lists count from 1."""
+    """Return a key path as a user would write it; elements of lists count from 1."""
     text = ""
     for part in path:
         text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else part
@@ -178,7 +178,7 @@ def shown_path(path: KeyPath) -> str:
 
 
 def nearest(name: str, names: Sequence[str]) -> tuple[str, ...]:
-    """A help that names the nearest of `names`; none where nothing is near."""
+    """Return a help that names the nearest of `names`; none where nothing is near."""
     near = get_close_matches(name, names, n=1, cutoff=0.6)
     return tuple(f"did you mean `{word}`?" for word in near)
 
@@ -209,7 +209,7 @@ class Document:
         self.faults.append(Diagnostic(self.code, message, Label(self.span(path)), help=helps))
 
     def span(self, path: KeyPath) -> Span:
-        """Where `path` stands; where it does not, what would hold it."""
+        """Return the place of `path`; where it is not there, that of the value that would hold it."""
         if self._places is None:
             self._places = _Scan(self.source.text).places
         for end in range(len(path), 0, -1):
@@ -227,7 +227,7 @@ class Document:
         self._check(kind, value, path)
 
     def holds(self, kind: Record) -> bool:
-        """Whether the keys of a record are there as it says, whatever else is."""
+        """Return whether the keys of a record are there as it declares, whatever else is."""
         keys = {**kind.needed, **kind.others}
         page = replace(
             self, faults=[], value={key: value for key, value in self.value.items() if key in keys}
@@ -236,7 +236,7 @@ class Document:
         return not page.faults
 
     def bad(self, error: type[BadFile]) -> BadFile:
-        """The faults as an exception."""
+        """Return the faults as an exception."""
         faults = sorted(dict.fromkeys(self.faults), key=lambda fault: fault.primary.span.start)
         more = len(faults) - MOST_FAULTS
         if more > 0:
@@ -253,7 +253,7 @@ class Document:
             self._check(of, inner, (*path, key))
 
     def _parts(self, kind: Kind, value: Any, path: KeyPath) -> Iterator[tuple[str | int, object, Kind]]:
-        """Each part of a value that fits, by key or position, and the kind it must be."""
+        """Yield each part of a value that fits, by key or position, and the kind it must be."""
         match kind:
             case Listing(of):
                 yield from ((at, item, of) for at, item in enumerate(value))
@@ -276,7 +276,7 @@ class Document:
 
 
 def fits(kind: Kind, value: Any) -> bool:
-    """Whether a value, but not what stands in it, is of a kind."""
+    """Return whether a value, without its parts, is of a kind."""
     match kind:
         case Number(low, high, whole):
             number = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
@@ -306,7 +306,7 @@ def fits(kind: Kind, value: Any) -> bool:
 
 
 def _short(value: object) -> str:
-    """The value as a message shows it."""
+    """Return the value as a message shows it."""
     match value:
         case bool():
             return f"`{str(value).lower()}`"
@@ -354,7 +354,7 @@ def _unread(name: str, message: str, code: Code, error: type[BadFile]) -> BadFil
 
 
 def _decode_place(message: str, text: str) -> int:
-    """The offset of an error of `tomllib`'s, which names line and column only in words."""
+    """Return the offset of an error of `tomllib`'s, which names line and column only in words."""
     words = message.rstrip(")").replace(",", " ").split()
     if "line" not in words or "column" not in words:
         return len(text) if "end of document" in message else 0
@@ -412,7 +412,7 @@ class _Scan:
         return path
 
     def _key(self) -> tuple[str, ...]:
-        """A key, dotted or not, up to what comes after it."""
+        """Return a key, dotted or not, up to the sign after it."""
         parts: list[str] = []
         while True:
             self._skip()

@@ -143,7 +143,7 @@ def door(address: str) -> Iterator[Path]:
 
 
 def policy(port: int) -> str:
-    """The content security policy: the page's own script and style, its own socket, and nothing else."""
+    """Return the content security policy: the page's own script and style, its own socket, and nothing else."""
     sockets = f"ws://127.0.0.1:{port} ws://localhost:{port}"
     return (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src data:; "
@@ -179,5 +179,5 @@ def refusal(headers: Mapping[str, str], path: str, port: int, token: str) -> str
 
 
 def _is_gone_to(headers: Mapping[str, str]) -> bool:
-    """Whether a window goes to the page: whoever had it do so sees nothing of it, and is no page that frames or fetches it."""
+    """Return whether a window goes to the page: whoever had it do so sees nothing of it, and is no page that frames or fetches it."""
     return headers.get("Sec-Fetch-Mode") == "navigate" and headers.get("Sec-Fetch-Dest") == "document"

@@ -41,14 +41,14 @@ def main() -> None:
 
 
 def _opened(process: int) -> list[int]:
-    """A descriptor of the process; none where it has ended, or the system has no such descriptors."""
+    """Return a descriptor of the process; none where it has ended, or the system has no such descriptors."""
     with contextlib.suppress(OSError, AttributeError):
         return [os.pidfd_open(process)]
     return []
 
 
 def _running(processes: list[int]) -> list[int]:
-    """The processes that have not ended; the others are closed. A descriptor can be read when its process has ended."""
+    """Return the processes that have not ended; the others are closed. A descriptor can be read when its process has ended."""
     ended = set(select.select(processes, [], [], 0)[0])
     for descriptor in ended:
         os.close(descriptor)

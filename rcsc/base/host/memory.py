@@ -28,7 +28,7 @@ def settled() -> None:
 
 @contextmanager
 def last_work() -> Iterator[None]:
-    """As `uncollected`, for the last work of a process: what there is at its end is not looked at when the process ends, either."""
+    """Do as `uncollected`, for the last work of a process: objects that are left at its end are not looked at, either."""
     with uncollected():
         yield
         gc.freeze()

@@ -58,7 +58,7 @@ def write_c(files: Mapping[str, str], place: Path) -> list[str]:
 
 @cache
 def c_compiler() -> str | Absent:
-    """The system's C compiler (`$CC`, else cc, gcc or clang)."""
+    """Return the system's C compiler (`$CC`, else cc, gcc or clang)."""
     names = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
     compiler = next((path for name in names if (path := shutil.which(name))), None)
     return compiler or Absent("no C compiler found (looked for cc, gcc and clang)")
@@ -66,7 +66,7 @@ def c_compiler() -> str | Absent:
 
 @cache
 def esbmc() -> str | Absent:
-    """The pinned ESBMC binary: its version and its SHA-256 are checked before it is believed."""
+    """Return the pinned ESBMC binary, whose version and SHA-256 are checked before it is believed."""
     try:
         installed = version(ESBMC_PACKAGE)
     except PackageNotFoundError:
@@ -87,7 +87,7 @@ def esbmc() -> str | Absent:
 
 @cache
 def cortex_tools() -> tuple[str, str] | Absent:
-    """The Cortex-M cross compiler and the emulator."""
+    """Return the Cortex-M cross compiler and the emulator."""
     compiler, emulator = shutil.which("arm-none-eabi-gcc"), shutil.which("qemu-system-arm")
     if compiler is None or emulator is None:
         missing = [

@@ -285,7 +285,7 @@ class Cause:
 
 
 def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
-    """One cause as it is reported."""
+    """Return one cause as it is reported."""
     span = cause.there or span
     failing = [
         (failure, place)

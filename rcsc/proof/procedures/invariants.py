@@ -122,7 +122,7 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
 
 
 def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
-    """The assumptions of the table, and every invariant of the program."""
+    """Return the assumptions of the table, and every invariant of the program."""
     return (*program.assumed(table), *program.invariants)
 
 
@@ -175,7 +175,7 @@ def _of_two(
 
 
 def _impossible(program: Program, table: Table, names: list[AssumptionName], options: Options) -> bool:
-    """Whether no values satisfy these assumptions and the invariants."""
+    """Return whether no values satisfy these assumptions and the invariants."""
     asked = replace(table, assumptions=tuple(dict.fromkeys(names)))
     try:
         return assumptions_satisfiable(program, asked, options) is Answer.UNSATISFIABLE

@@ -114,7 +114,7 @@ def _results(program: Program, meeting: Meeting, shown: Disagreement) -> Iterato
 def witness_column(
     program: Program, table: Table, witness: Mapping[str, Value], lines: Iterable[Line], *, added: bool
 ) -> WitnessColumn:
-    """An input as a column of the table, with what lines say of each variable; `added`: with what `above` and `same` add to them."""
+    """Return an input as a column of the table, with each line's cell under a variable; `added`: with those that `above` and `same` add."""
     kinds = program.kinds
     names = tuple(name for name in kinds if name in witness)
     matched = tuple(
@@ -127,7 +127,7 @@ def witness_column(
 
 
 def _cells(table: Table, line: Line, name: str, added: bool) -> str:
-    """What a line says of a variable, as it is written; a test of several variables stands with the first."""
+    """Return the cell of a line under a variable, as it is written; a test of several variables stands with the first."""
     return "; ".join(
         test.text if column.variable == name or column.subject is None else f"{column.heading} {test.text}"
         for test, column in zip(line.tests, table.columns, strict=True)

@@ -62,7 +62,7 @@ def called_by_lines(program: Program) -> set[str]:
 
 
 def defined_alone(program: Program, table: Table) -> bool:
-    """Whether the declared ranges alone show every condition of the table to be defined, without a solver."""
+    """Return whether the declared ranges alone show every condition of the table to be defined, without a solver."""
     run = Run.of(program, {})
     for test in table.distinct_tests:
         if may_be_undefined(test.condition):
@@ -198,7 +198,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _tests(self, table: Table) -> Iterator[_Owing]:
-        """Every condition of the table is evaluated in every cycle, whatever the others say."""
+        """Run every condition of the table, which is evaluated in every cycle, whatever the others give."""
         owing = {id(test): test for test in table.distinct_tests if may_be_undefined(test.condition)}
         stating: dict[int, list[tuple[Line, int]]] = {}
         for line in table.lines if owing else ():

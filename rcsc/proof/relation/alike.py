@@ -112,7 +112,7 @@ def disagreement(
 
 
 def _over(what: str) -> bool:
-    """Whether nothing more is asked: then nothing is put into Z3's words, either, which takes longer than to ask."""
+    """Return whether nothing more is asked: then nothing is put into Z3's words, either, which takes longer than to ask."""
     if smt.spent():
         smt.leave_open(what)
         return True
@@ -120,12 +120,12 @@ def _over(what: str) -> bool:
 
 
 def _relied(program: Program, table: Table) -> list[Expr]:
-    """What the table may rely on."""
+    """Return the condition that the table may rely on."""
     return [assumption.condition for assumption in program.assumed(table)]
 
 
 def _spelled(line: Line) -> list[object]:
-    """The line's statements, which say all that it does."""
+    """Return the line's statements, which are all that it does."""
     return [action.statement for action in line.actions]
 
 
@@ -198,7 +198,7 @@ def _possible(nodes: list[Node], options: Options) -> Answer:
 
 
 def _point(nodes: list[Node], options: Options) -> Mapping[str, Value] | Answer:
-    """Values for which all nodes hold; else Z3's answer."""
+    """Return values for which all nodes hold; else Z3's answer."""
     solver = stated(nodes, options)
     answer = solver.check()
     if answer is not Answer.SATISFIABLE:

@@ -100,7 +100,7 @@ class Shared:
         return TRUE if self._built(left) == self._built(right) else values.equal(left, right)
 
     def _built(self, node: Node) -> int:
-        """A number for how a value is built."""
+        """Return a number for how a value is built."""
         for part in values.parts_first(node):
             if part not in self._number:
                 args = tuple(self._number[arg] for arg in part.args)
@@ -120,7 +120,7 @@ class _Followed(Run):
     calls: list[ExternCall] = field(default_factory=list)
 
     def call(self, procedure: Procedure, args: list[tuple[Span, Node]]) -> None:
-        """As `Run.call`; the results of the n-th extern call have the same names in every run."""
+        """Run a call; the results of the n-th extern call have the same names in every run."""
         if procedure.extern is not None:
             given = (*(self.leaf(name) for name in procedure.reads), *(value for _, value in args))
             spelled = f"{procedure.name} {procedure.extern} {procedure.reads} {procedure.writes}"
@@ -128,7 +128,7 @@ class _Followed(Run):
         Run.call(self, procedure, args)
 
     def any_value(self, name: str, kind: Scalar) -> Node:
-        """A value that nothing is known of; named by its place among the extern calls, or in the run."""
+        """Return a value of which nothing is known, named by its place among the extern calls, or in the run."""
         self.fresh.append(values.variable(f"{name} ({max(1, len(self.calls))})", kind))
         return self.fresh[-1]
 
@@ -224,7 +224,7 @@ def _paid(owed: Obligation) -> Node:
 
 
 def value_after(effect: Effect, leaf: str, shared: Shared) -> Node:
-    """The leaf's value after the run."""
+    """Return the leaf's value after the run."""
     return effect.leaves.get(leaf, shared.start[leaf])
 
 

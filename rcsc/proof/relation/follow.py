@@ -57,7 +57,7 @@ class Follow:
 
 
 def following(program: Program, table: Table, options: Options) -> list[Follow]:
-    """Every pair of lines of which the second can match in the cycle after the first.
+    """Return every pair of lines of which the second can match in the cycle after the first.
 
     Raises:
         UndecidedError: Z3 gave no answer, or a cycle is too long to follow.
@@ -73,7 +73,7 @@ def following(program: Program, table: Table, options: Options) -> list[Follow]:
 
 
 def _level_of(program: Program, table: Table) -> tuple[Level, Value | None] | None:
-    """The level that runs the table, and the value of its selector; None where none does."""
+    """Return the level that runs the table, and the value of its selector; None where none does."""
     for level in program.levels:
         for choice in level.choices:
             if isinstance(choice, OneTable):
@@ -119,7 +119,7 @@ class _Cycles:
         self.loose = count(1)
 
     def pairs(self) -> Iterator[Follow]:
-        """Every pair that is possible."""
+        """Yield every pair that is possible."""
         first = Run.of(self.program, self.start)
         self._before_table(first)
         for variable in self.program.variables:
@@ -146,7 +146,7 @@ class _Cycles:
                     yield Follow(at, to, needed(tests[to], can_be) if to < len(tests) else ())
 
     def _before_table(self, run: Run) -> None:
-        """Any inputs, the deferred values that are due, and the preprocess."""
+        """Give the inputs any values, take the deferred values that are due, and run the preprocess."""
         self.cycle += 1
         for variable in self.program.variables:
             if variable.kind is Kind.INPUT:
@@ -158,7 +158,7 @@ class _Cycles:
         self._others(run, after=False)
 
     def _others(self, run: Run, *, after: bool) -> None:
-        """The tables of the cycle before this one, or after it."""
+        """Run the cycle's tables before this one, or after it."""
         choices = () if self.level is None else self.level[0].choices
         own = next((at for at, choice in enumerate(choices) if self.table.name in choice.names), 0)
         tables = {str(table.name): table for table in self.program.tables}
@@ -182,7 +182,7 @@ class _Cycles:
         return facts
 
     def _tests(self, run: Run) -> list[Mapping[int, Node]]:
-        """The tests of each line, by column, as they are then; one that several lines state is evaluated once."""
+        """Return the tests of each line, by column, as they are then; one that several lines state is evaluated once."""
         known = {id(test): run.evaluate(test.condition) for test in self.table.distinct_tests}
         return [
             {at: known[id(test)] for at, test in enumerate(line.tests) if test is not None}

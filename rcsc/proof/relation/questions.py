@@ -12,14 +12,14 @@ from rcsc.proof.symbolic.values import FALSE, Node
 
 
 def stated(nodes: Collection[Node], options: Options, spoken_of: Collection[Node] = ()) -> Solver:
-    """A solver that knows that all nodes hold, and the ranges of their variables and of those that are spoken of later."""
+    """Return a solver that knows that all nodes hold, and the ranges of their variables and of those that are spoken of later."""
     solver = Solver(options.limits)
     solver.add(*values.domain(values.variables([*nodes, *spoken_of]).values()), *map(values.term_of, nodes))
     return solver
 
 
 def answer(solver: Solver, *nodes: Node) -> Answer:
-    """Whether the nodes can hold together, and with what the solver knows."""
+    """Return whether the nodes can hold together, and with what the solver knows."""
     if any(node is FALSE for node in nodes):
         return Answer.UNSATISFIABLE
     solver.push()
@@ -31,7 +31,7 @@ def answer(solver: Solver, *nodes: Node) -> Answer:
 
 
 def possible(solver: Solver, *nodes: Node) -> bool:
-    """Whether the nodes can hold together, and with what the solver knows.
+    """Return whether the nodes can hold together, and with what the solver knows.
 
     Raises:
         UndecidedError: Z3 gave no answer.
@@ -43,7 +43,7 @@ def possible(solver: Solver, *nodes: Node) -> bool:
 
 
 def needed(tests: Mapping[int, Node], can_be: Callable[..., bool]) -> tuple[int, ...]:
-    """The columns of a line whose tests neither its others nor what is known imply.
+    """Return the columns of a line whose tests neither its others nor what is known imply.
 
     Args:
         tests: By column.

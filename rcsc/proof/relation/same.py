@@ -108,7 +108,7 @@ def outcomes(
 
 
 def compare(first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> Comparison:
-    """Whether the tables do the same for every input that the first one's assumptions admit."""
+    """Return whether the tables do the same for every input that the first one's assumptions admit."""
     try:
         return _Question(first, second, options).answer()
     except (TooLongError, RecursionError):
@@ -154,7 +154,7 @@ class _Question:
         return found
 
     def _changes(self, first: Outcome, second: Outcome) -> list[tuple[str, Node]]:
-        """What can differ afterwards, and where it does; nothing where one of them is a fault."""
+        """Return the differences afterwards, and where they are; nothing where one of the two runs is a fault."""
         if first.actions is None or second.actions is None:
             return []
         return list(differences(self.effects[first], self.effects[second], self.compared, self.shared))

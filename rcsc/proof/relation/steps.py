@@ -40,7 +40,7 @@ MOST_STATES = 64
 
 
 def is_few(kind: Scalar) -> bool:
-    """Whether a variable of the type can hold a state: an enumeration, a boolean or a few integers."""
+    """Return whether a variable of the type can hold a state: an enumeration, a boolean or a few integers."""
     low, high = key_bounds(kind)
     return isinstance(kind, Enum | Bool | Int) and high - low < MOST_STATES
 
@@ -75,7 +75,7 @@ def reached(solver: Solver, before: Node, after: Node) -> Iterator[tuple[Value, 
 
 
 def pair_is(nodes: Sequence[Node], ends: Sequence[Value]) -> Node:
-    """The condition that nodes have these values."""
+    """Return the condition that nodes have these values."""
     return values.all_of(
         values.equal(node, values.constant(node.kind, end)) for node, end in zip(nodes, ends, strict=True)
     )
@@ -103,11 +103,11 @@ class Steps:
         self._lines = self._meaning.every_line(self.table)
 
     def states(self) -> list[Value]:
-        """The values that the state variable can have under the assumptions, in order."""
+        """Return the values that the state variable can have under the assumptions, in order."""
         return [value for value in self._values() if self._possible(self._is(value))]
 
     def steps(self, states: Sequence[Value]) -> list[Step]:
-        """Every step from these states; by line, then in the states' order."""
+        """Return every step from these states; by line, then in the states' order."""
         steps: list[Step] = []
         for at, line in enumerate(self.table.every_line):
             pairs = self._pairs(self._lines[at], line.actions)
@@ -117,7 +117,7 @@ class Steps:
         return steps
 
     def _pairs(self, line: Node, actions: Sequence[Action]) -> set[tuple[Value, Value]]:
-        """Every state before with one to which the actions lead: the pending one, and one written directly."""
+        """Return every state before with one to which the actions lead: the pending one, and one written directly."""
         effect = self._effect(actions)
         after = [(values.TRUE, value_after(effect, self._next, self._shared))]
         if self.state.name != self._next and self.state.name in effect.wrote:
@@ -132,7 +132,7 @@ class Steps:
         return pairs
 
     def sets(self, action: Action) -> Value | None:
-        """The state that the action alone, whatever the input, leads to; None where it does anything else too."""
+        """Return the state that the action alone, whatever the input, leads to; None where it does anything else too."""
         effect = self._effect([action])
         written = {name for name, when in effect.wrote.items() if not when.known or when.low}
         if written != {self._next} or not effect.wrote[self._next].known:
@@ -141,7 +141,7 @@ class Steps:
         return value_of_key(self.state.type, int(after.low)) if after.known else None
 
     def writes(self, action: Action) -> bool:
-        """Whether the action can write the state."""
+        """Return whether the action can write the state."""
         return not {self._next, self.state.name}.isdisjoint(self._effect([action]).wrote)
 
     def needed(self, line: int, source: Value | None) -> tuple[int, ...]:

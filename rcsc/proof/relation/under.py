@@ -32,7 +32,7 @@ class Under:
 
 
 def lines_under(program: Program, table: Table, condition: Expr, options: Options) -> Under:
-    """The lines that can match where a condition holds."""
+    """Return the lines that can match where a condition holds."""
     program = relying(program)
     meant = program.table(table.name)
     meaning = Meaning(program, Shared(program.kinds))

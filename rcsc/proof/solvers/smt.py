@@ -224,7 +224,7 @@ class UndecidedError(Exception):
 
 
 def troubles() -> tuple[type[BaseException], ...]:
-    """No answer where one is needed, errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
+    """Return the errors after which nothing is proved: no answer where one is needed, errors of Z3, exhausted memory."""
     loaded = sys.modules.get("z3")
     return (UndecidedError, MemoryError, *(() if loaded is None else (loaded.Z3Exception,)))
 
@@ -538,7 +538,7 @@ class Solver:
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
 
     def possible(self, *assuming: Term) -> bool:
-        """Whether all asserted terms, and these, hold together for some values.
+        """Return whether all asserted terms, and these, hold together for some values.
 
         Raises:
             UndecidedError: Z3 gave no answer.

@@ -49,18 +49,18 @@ class Bits:
         return cls(_few=few(nodes))
 
     def fresh(self) -> Literal:
-        """A new variable."""
+        """Return a new variable."""
         self.count += 1
         return self.count
 
     def word(self, node: Node) -> Word:
-        """The bits of a node: one for a truth value."""
+        """Return the bits of a node: one for a truth value."""
         for part in parts_first(node, known=self._words):
             self._words[part] = self._word_of(part)
         return self._words[node]
 
     def literal(self, node: Node) -> Literal:
-        """The literal of a truth value."""
+        """Return the literal of a truth value."""
         return self.word(node)[0]
 
     def equals(self, word: Word, kind: Scalar, key: int) -> Literal:
@@ -70,7 +70,7 @@ class Bits:
         return self._equal(word, constant(key))
 
     def both(self, a: Literal, b: Literal) -> Literal:
-        """The literal of *a and b*."""
+        """Return the literal of *a and b*."""
         if a in (b, TRUE) or b == FALSE:
             return b
         if b == TRUE or a == FALSE:
@@ -84,7 +84,7 @@ class Bits:
         return self._gates[key]
 
     def all_of(self, literals: Iterable[Literal]) -> Literal:
-        """The literal of all of them together."""
+        """Return the literal of all of them together."""
         conjunction = TRUE
         for literal in literals:
             conjunction = self.both(conjunction, literal)
@@ -210,7 +210,7 @@ class Bits:
         return self._named[name]
 
     def _within(self, low: int, high: int) -> Word:
-        """A word of any value from `low` to `high`."""
+        """Return a word of any value from `low` to `high`."""
         signed = low < 0
         width = max(low.bit_length(), (-low - 1).bit_length() if signed else 0, high.bit_length())
         word = tuple(self.fresh() for _ in range(width)) + ((self.fresh(),) if signed else (FALSE,))
@@ -258,7 +258,7 @@ class Bits:
                 return self._any(node)
 
     def _any(self, node: Node) -> Word:
-        """Any value within the bounds of the node; the same for nodes built alike."""
+        """Return any value within the bounds of the node; the same for nodes built alike."""
         number = self._alike.number(node)
         if number not in self._open:
             self._open[number] = self._anything(node)
@@ -273,7 +273,7 @@ class Bits:
 
 
 def constant(key: int) -> Word:
-    """A number as a word."""
+    """Return a number as a word."""
     return tuple(TRUE if key >> at & 1 else FALSE for at in range(key.bit_length() + 1))
 
 
@@ -290,7 +290,7 @@ def _aligned(a: Word, b: Word) -> Iterable[tuple[Literal, Literal]]:
 
 
 def key_of_bits(word: Sequence[bool]) -> int:
-    """The number that a word stands for."""
+    """Return the number that a word stands for."""
     size = sum(1 << at for at, bit in enumerate(word[:-1]) if bit)
     return size - (1 << (len(word) - 1)) if word[-1] else size
 
@@ -307,7 +307,7 @@ class Few:
 
 
 def few(nodes: Sequence[Node]) -> dict[Node, Few]:
-    """Numbers in these nodes that are only copied and compared for equality, each with its class."""
+    """Return the numbers in these nodes that are only copied and compared for equality, each with its class."""
     every = [node for node in parts_first(*nodes) if not isinstance(node.kind, Bool | Enum)]
     classes = _Classes()
     calculated = _joined(parts_first(*nodes), classes)
@@ -331,7 +331,7 @@ def few(nodes: Sequence[Node]) -> dict[Node, Few]:
 
 
 def _room(node: Node) -> int:
-    """How many values a variable has."""
+    """Return how many values a variable has."""
     low, high = key_bounds(node.kind)
     return high - low + 1
 
@@ -343,7 +343,7 @@ class _Classes:
     _up: dict[Node, Node] = field(default_factory=dict)
 
     def of(self, node: Node) -> Node:
-        """The one that stands for its set."""
+        """Return the one that stands for its set."""
         while (up := self._up.get(node, node)) is not node:
             self._up[node] = self._up.get(up, up)
             node = up
@@ -376,7 +376,7 @@ def _joined(nodes: Iterable[Node], classes: _Classes) -> set[Node]:
 
 
 def _calculated(node: Node) -> set[Node]:
-    """The node and its parts, where its value depends on theirs here (see `Bits._number`)."""
+    """Return the node and its parts, where its value depends on theirs here (see `Bits._number`)."""
     real = isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real)
     if real and node.op not in (*COMPARISONS, Op.NEG, Op.ABS, Op.MIN, Op.MAX):
         return set()

@@ -54,7 +54,7 @@ class Frame:
 
 
 def encode(expr: Expr, frame: Frame) -> Term:
-    """The term of `expr` in the frame."""
+    """Return the term of `expr` in the frame."""
     match expr:
         case Literal(value=value, type=kind):
             return smt.literal(kind, value)
@@ -86,12 +86,12 @@ def encode(expr: Expr, frame: Frame) -> Term:
 
 
 def _splits(number: Expr, by: Value) -> bool:
-    """Whether an integer is divided that is not below zero, by one above."""
+    """Return whether an integer is divided that is not below zero, by one above."""
     return isinstance(number.type, Int) and number.type.low >= 0 and by > 0
 
 
 def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
-    """The term of an operator over operands, the first of which is of type `kind`."""
+    """Return the term of an operator over operands, the first of which is of type `kind`."""
     if is_logic(op):
         whole = truth_function(op, _signed(terms[0]), _signed(terms[1]), smt.all_of, smt.any_of)
         return whole(True)
@@ -151,7 +151,7 @@ def within(term: Term, kind: Scalar) -> Term:
 
 
 def declared(variables: Iterable[Variable], conditions: Iterable[Expr] = ()) -> tuple[Frame, list[Term]]:
-    """A frame of fresh constants, one a leaf, and that each is in its range.
+    """Return a frame of fresh constants, one a leaf, and that each is in its range.
 
     Args:
         variables: One constant each.
@@ -172,7 +172,7 @@ def declared(variables: Iterable[Variable], conditions: Iterable[Expr] = ()) -> 
 def least_where(
     conditions: Iterable[Expr], variables: Iterable[Variable], shown: Iterable[Variable], options: Options
 ) -> dict[str, Value] | None:
-    """The least values of the variables shown for which the conditions hold; None where there are none, or none is found."""
+    """Return the least values of the variables shown for which the conditions hold; None where there are none, or none is found."""
     if smt.gives_up("the least input"):
         return None
     every = list(conditions)
@@ -192,7 +192,7 @@ def least_witness(
     spare: smt.Budget | None = None,
     known: Mapping[str, Value] | None = None,
 ) -> dict[str, Value] | None:
-    """The least values, in declared order, for which what is asserted holds; None where none is found.
+    """Return the least values, in declared order, for which what is asserted holds; None where none is found.
 
     Any model of Z3's may change with its version; the least one depends on the question alone. Where the
     solver gives up on the way, the values found last stand: a witness still, but not the least. The solver is
@@ -225,7 +225,7 @@ def least_witness(
 
 
 def _model(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, int]:
-    """The keys of the last model."""
+    """Return the keys of the last model."""
     return {v.name: key_of(v.type, solver.value(frame.leaves[v.name], v.type)) for v in variables}
 
 

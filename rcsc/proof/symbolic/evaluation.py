@@ -98,12 +98,12 @@ class State:
     wrote: dict[str, Node] = field(default_factory=dict)
 
     def copy(self) -> "State":
-        """A state that can go its own way."""
+        """Return a state that can go its own way."""
         return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
 
 
 def _word_of(expr: Apply) -> tuple[int, int]:
-    """The 64-bit type in which integer operands and result of an operation stand."""
+    """Return the 64-bit type in which integer operands and result of an operation stand."""
     return intervals.word(
         kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)
     )
@@ -192,7 +192,7 @@ class Evaluation:
     # --- expressions ---
 
     def evaluate(self, expr: Expr) -> Node:
-        """The value of an expression; what it owes is added."""
+        """Return the value of an expression; what it owes is added."""
         match expr:
             case Literal(value=value, type=kind):
                 return values.constant(kind, value)
@@ -208,7 +208,7 @@ class Evaluation:
                 return self._applied(expr)
 
     def leaf(self, name: str) -> Node:
-        """The value of a leaf, within what is known of it here."""
+        """Return the value of a leaf, within what is known of it here."""
         node = self.state.leaves.get(name)
         if node is None:
             if name not in self.start:
@@ -229,12 +229,12 @@ class Evaluation:
         return self._sharpened(self.state.local[name])
 
     def any_value(self, name: str, kind: Scalar) -> Node:
-        """A value of the type that nothing else is known of."""
+        """Return a value of the type of which nothing else is known."""
         self.fresh.append(values.variable(f"{name}!{len(self.fresh) + 1}{self.suffix}", kind))
         return self.fresh[-1]
 
     def index(self, expr: Expr, length: int) -> Node:
-        """An index of an array of this length."""
+        """Return an index of an array of this length."""
         message = f"the index can lie outside 0 .. {length - 1}"
         return self.owe_inside(Code.INDEX, self.evaluate(expr), (0, length - 1), message, expr.span)
 
@@ -249,7 +249,7 @@ class Evaluation:
         return selected
 
     def _logic(self, op: Logic, first: Expr, second: Expr) -> Node:
-        """The right operand is looked at only where the left one does not decide."""
+        """Evaluate a truth function; the right operand is looked at only where the left one does not decide."""
         left = self.evaluate(first)
         if len(UNDECIDED[op]) == 2:
             return values.logic(op, left, self.evaluate(second))
@@ -309,7 +309,7 @@ class Evaluation:
         )
 
     def _truncated(self, expr: Apply, arg: Node, kind: Int) -> Node:
-        """A double without its fraction, where that is in 64 bits; never so of a NaN."""
+        """Return a double without its fraction, where that is in 64 bits; never so of a NaN."""
         low, high = intervals.word([kind])
         least = values.constant(arg.kind, -1.0 if low == 0 else float(low))
         above = values.compare(Op.LT if low == 0 else Op.LE, least, arg)

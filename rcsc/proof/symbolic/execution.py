@@ -46,7 +46,7 @@ class Run(Evaluation):
 
     @classmethod
     def of(cls, program: Program, start: dict[str, Node]) -> Self:
-        """A run of a program from these leaves; those that it meets besides may have any value."""
+        """Return a run of a program from these leaves; those that it meets besides may have any value."""
         return cls({str(procedure.name): procedure for procedure in program.procedures}, program.kinds, start)
 
     def execute(self, body: Iterable[Statement]) -> None:
@@ -99,7 +99,7 @@ class Run(Evaluation):
         return conditions
 
     def _stored(self, kind: Scalar, value: Node, what: str, span: Span) -> Node:
-        """The value as kept in a place of this type."""
+        """Return the value as kept in a place of this type."""
         if not isinstance(kind, Int | Real):
             return value
         ends = f"{spell(kind, kind.low)} .. {spell(kind, kind.high)}"
@@ -157,7 +157,7 @@ class Run(Evaluation):
         self.state = self._merged(condition, taken, self.state)
 
     def _case(self, statement: Case) -> None:
-        """The arms are disjoint, so that their order does not matter."""
+        """Run the arms, which are disjoint, so that their order does not matter."""
         subject = self.evaluate(statement.subject)
         self._arms(
             [(values.among(subject, arm.values), arm.body) for arm in statement.arms], statement.orelse

@@ -47,13 +47,13 @@ class Keyed:
     _alike: Alike = field(default_factory=Alike)
 
     def term(self, node: Node) -> Term:
-        """The term of a node; parts first, without recursion."""
+        """Return the term of a node; parts first, without recursion."""
         for part in parts_first(node, known=self._terms):
             self._terms[part] = self._term_of(part)
         return self._terms[node]
 
     def variable(self, name: str, kind: Scalar) -> Term:
-        """The term of a variable, in its declared range."""
+        """Return the term of a variable, in its declared range."""
         if name not in self._variables:
             term = self.fresh(name, kind)
             if not isinstance(kind, Bool):
@@ -62,11 +62,11 @@ class Keyed:
         return self._variables[name]
 
     def fresh(self, name: str, kind: Scalar) -> Term:
-        """A constant of the sort that values of the type have here; its range is not asserted."""
+        """Return a constant of the sort that values of the type have here; its range is not asserted."""
         return smt.member(name) if isinstance(kind, Enum) else smt.variable(name, sort(kind))
 
     def literal(self, kind: Scalar, value: int | float) -> Term:
-        """A constant."""
+        """Return a constant."""
         if isinstance(kind, Bool):
             return smt.truth(bool(value))
         return _key(kind, key_of(kind, value))
@@ -113,7 +113,7 @@ class Keyed:
                 return self._number(op, node, parts)
 
     def _number(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
-        """Arithmetic: exact where it is linear, or only orders."""
+        """Return the term of arithmetic: exact where it is linear, or only orders."""
         left, right = node.args[0], node.args[-1]
         match op:
             case Op.NEG:
@@ -141,11 +141,11 @@ class Keyed:
                 return self.any(node)
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
-        """An operation with a real in it."""
+        """Return an operation with a real in it."""
         return self.any(node)
 
     def any(self, node: Node) -> Term:
-        """Any value within the bounds of the node."""
+        """Return any value within the bounds of the node."""
         key = node.op, node.kind, tuple(map(self._alike.number, node.args))
         term = self._open.get(key)
         if term is None:

@@ -26,11 +26,11 @@ class Measured(Keyed):
     """Makes terms with reals that are numbers."""
 
     def fresh(self, name: str, kind: Scalar) -> Term:
-        """A constant."""
+        """Return a constant."""
         return smt.number(name) if isinstance(kind, Real) else super().fresh(name, kind)
 
     def literal(self, kind: Scalar, value: int | float) -> Term:
-        """A constant value."""
+        """Return a constant value."""
         return smt.fraction(value) if isinstance(kind, Real) else super().literal(kind, value)
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:

@@ -35,7 +35,7 @@ class Answers:
     _nodes: int = 0
 
     def get(self, key: Key, nodes: int, make: Callable[[], T]) -> T:
-        """The answer to a question, else a new one.
+        """Return the answer to a question, else a new one.
 
         Args:
             key: All that the question is made of.
@@ -78,7 +78,7 @@ def remembering(answers: Answers) -> Iterator[None]:
 
 
 def answered(what: Key, nodes: Sequence[Node], make: Callable[[], T]) -> T:
-    """The answer to a question about some nodes.
+    """Return the answer to a question about some nodes.
 
     Args:
         what: Which question it is, and all that it depends on beside the nodes; no budget.
@@ -92,7 +92,7 @@ def answered(what: Key, nodes: Sequence[Node], make: Callable[[], T]) -> T:
 
 
 def _spelled(order: Sequence[Node], asked: Sequence[Node]) -> Key:
-    """All that nodes are made of, parts first, and which of them are asked about."""
+    """Return the nodes with all their parts, parts first, and which of them are asked about."""
     at = {node: place for place, node in enumerate(order)}
     parts = tuple(
         (
@@ -109,5 +109,5 @@ def _spelled(order: Sequence[Node], asked: Sequence[Node]) -> Key:
 
 
 def _exactly(bound: int | float) -> int | str:
-    """A bound; a double with the sign of its zero, which equality does not see."""
+    """Return a bound; a double with the sign of its zero, which equality does not see."""
     return bound.hex() if isinstance(bound, float) else bound

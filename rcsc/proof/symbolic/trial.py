@@ -80,7 +80,7 @@ def aimed(conditions: Sequence[Expr], variables: Sequence[Variable]) -> Point | 
 
 
 def points(variables: Sequence[Variable]) -> Iterator[Point]:
-    """Values of these variables to try: ends first, then edges and others; always the same."""
+    """Yield values of these variables to try: ends first, then edges and others; always the same."""
     random = Random(0)  # noqa: S311  # a sample, not a secret
     nodes = [variable_of(str(variable.name), variable.type) for variable in variables]
     for number in range(SAMPLES):
@@ -101,14 +101,14 @@ class Aim:
 
     @classmethod
     def of(cls, test: Test) -> Self:
-        """The aim of a test; of one across variables there is none."""
+        """Return the aim of a test; of one across variables there is none."""
         if test.box:
             return cls(((str(test.variables[0]), test.box),), ())
         return cls((), tuple(_masks(conjuncts(test.condition))))
 
     @classmethod
     def at(cls, condition: Expr, variables: Sequence[Variable]) -> Self:
-        """The aim of a condition: what its parts say that must all hold."""
+        """Return the aim of a condition: that of all parts that must hold."""
         known = {variable.name: variable for variable in variables}
         boxes: dict[str, Box] = {}
         masks: list[tuple[str, int, int]] = []
@@ -130,7 +130,7 @@ def _masks(conditions: Iterable[Expr]) -> Iterator[tuple[str, int, int]]:
 
 
 def towards(point: Point, aims: Iterable[Aim], kinds: Mapping[str, Scalar], random: Random) -> Point:
-    """The point changed so that each aim is met by itself, where it can be, boxes first; the last that changes a variable wins.
+    """Return the point, changed so that each aim is met by itself, where it can be, boxes first; the last that changes a variable wins.
 
     A mask comes after: it leaves bits free, so that what was chosen for a range mostly stays in it.
     """
@@ -150,7 +150,7 @@ Ready = Callable[[Mapping[str, Value]], bool]
 
 
 def ready(condition: Expr) -> Ready:
-    """The condition, to be tried at many points: a mask of a word is one comparison there, and no walk over its bits.
+    """Return the condition, to be tried at many points: a mask of a word is one comparison there, and no walk over its bits.
 
     It raises where the interpreter does.
     """
@@ -172,7 +172,7 @@ def ready(condition: Expr) -> Ready:
 
 
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
-    """Whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
+    """Return whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
     return _all_hold(list(parts_first(condition)), [condition], point)
 
 
@@ -250,7 +250,7 @@ def _all_hold(order: Sequence[Node], conditions: Sequence[Node], point: Mapping[
 
 
 def _known(order: Sequence[Node], point: Mapping[str, Value]) -> dict[Node, Value | None]:
-    """The value of each node."""
+    """Return the value of each node."""
     known: dict[Node, Value | None] = {}
     for node in order:
         known[node] = _value(node, [known[part] for part in node.args], point)
@@ -258,7 +258,7 @@ def _known(order: Sequence[Node], point: Mapping[str, Value]) -> dict[Node, Valu
 
 
 def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) -> Value | None:
-    """The node's value; None where it is not defined."""
+    """Return the node's value; None where it is not defined."""
     match node.op:
         case Shape.CONSTANT:
             return bool(node.low) if isinstance(node.kind, Bool) else node.low

@@ -91,7 +91,7 @@ class Node:
 
 
 def constant(kind: Scalar, value: Value) -> Node:
-    """A constant."""
+    """Return a constant."""
     point = float(value) if isinstance(kind, Real) else int(value)
     return Node(CONSTANT, (), kind, point, point)
 
@@ -100,30 +100,30 @@ TRUE, FALSE = constant(Bool(), True), constant(Bool(), False)
 
 
 def truth(value: bool) -> Node:
-    """The constant true or false."""
+    """Return the constant true or false."""
     return TRUE if value else FALSE
 
 
 def bounds(kind: Scalar) -> tuple[int | float, int | float]:
-    """Least and greatest value of the type, booleans and members as integers."""
+    """Return the least and the greatest value of the type, booleans and members as integers."""
     return (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
 
 
 def variable(name: str, kind: Scalar) -> Node:
-    """Any value of the type."""
+    """Return any value of the type."""
     low, high = bounds(kind)
     return Node(VARIABLE, (), kind, low, high, name)
 
 
 def root(node: Node) -> Node:
-    """The node without what was learnt of its bounds."""
+    """Return the node without what was learnt of its bounds."""
     while node.op == NARROWED:
         node = node.args[0]
     return node
 
 
 def narrowed(node: Node, low: int | float, high: int | float) -> Node:
-    """The same value where it is known to lie within the bounds too."""
+    """Return the same value where it is known to lie within the bounds too."""
     low, high = max(low, node.low), min(high, node.high)
     if (low, high) == (node.low, node.high) or low > high:
         return node
@@ -143,7 +143,7 @@ def negation(node: Node) -> Node:
 
 
 def both(left: Node, right: Node) -> Node:
-    """Conjunction."""
+    """Return the conjunction."""
     if left.known:
         return right if left.low else FALSE
     if right.known:
@@ -152,12 +152,12 @@ def both(left: Node, right: Node) -> Node:
 
 
 def either(left: Node, right: Node) -> Node:
-    """Disjunction."""
+    """Return the disjunction."""
     return negation(both(negation(left), negation(right)))
 
 
 def follows(premise: Node, conclusion: Node) -> Node:
-    """Implication."""
+    """Return the implication."""
     return either(negation(premise), conclusion)
 
 
@@ -193,7 +193,7 @@ def among(subject: Node, values: Sequence[Value]) -> Node:
 
 
 def logic(op: Logic, left: Node, right: Node) -> Node:
-    """A truth function of two conditions."""
+    """Return a truth function of two conditions."""
 
     def signed(node: Node) -> Signed[Node]:
         return lambda wanted: node if wanted else negation(node)
@@ -204,7 +204,7 @@ def logic(op: Logic, left: Node, right: Node) -> Node:
 
 
 def compare(op: Comparison, left: Node, right: Node) -> Node:
-    """A comparison, decided where the bounds do."""
+    """Return a comparison, decided where the bounds do."""
     match op:
         case Op.NE:
             return negation(_ordering(Op.EQ, left, right))
@@ -237,7 +237,7 @@ def _decided(op: Ordering, left: Node, right: Node) -> bool | None:
 
 
 def arithmetic(op: Arithmetic | Conversion, args: tuple[Node, ...], kind: Scalar) -> Node:
-    """Any operator on numbers but comparisons; `kind` is that of the result."""
+    """Return any operator on numbers but comparisons; `kind` is that of the result."""
     low, high = _bounds(op, args)
     node = Node(op, args, kind, low, high)
     if low != high or not node.ordered or (isinstance(kind, Real) and not all(arg.known for arg in args)):
@@ -267,12 +267,12 @@ def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | 
 
 
 def remainder(value: Node, divisor: Node, kind: Scalar) -> Node:
-    """The remainder of a division of integers; `kind` is that of the result."""
+    """Return the remainder of a division of integers; `kind` is that of the result."""
     return arithmetic(Op.MOD, (value, divisor), kind)
 
 
 def wraps_once(node: Node) -> bool:
-    """Whether it is a `mod` that subtracts its divisor at most once: the value is from 0 to below twice the divisor."""
+    """Return whether it is a `mod` that subtracts its divisor at most once: the value is from 0 to below twice the divisor."""
     if node.op != Op.MOD:
         return False
     value, divisor = node.args
@@ -280,7 +280,7 @@ def wraps_once(node: Node) -> bool:
 
 
 def takes_bits(node: Node) -> bool:
-    """Whether it is a division by a power of two, of what is never negative: then it takes some bits of it."""
+    """Return whether it is a division by a power of two, of what is never negative: then it takes some bits of it."""
     if node.op not in DIVISIONS:
         return False
     value, divisor = node.args
@@ -288,12 +288,12 @@ def takes_bits(node: Node) -> bool:
 
 
 def equal(left: Node, right: Node) -> Node:
-    """Equality of two values of one type."""
+    """State that two values of one type are equal."""
     return compare(Op.EQ, left, right)
 
 
 def inside(node: Node, low: int | float, high: int | float) -> Node:
-    """Whether it is in bounds; false for a NaN."""
+    """State that it is in bounds, which a NaN is not."""
     least, greatest = constant(node.kind, low), constant(node.kind, high)
     return both(compare(Op.LE, least, node), compare(Op.LE, node, greatest))
 
@@ -302,7 +302,7 @@ def inside(node: Node, low: int | float, high: int | float) -> Node:
 
 
 def term_of(node: Node) -> Term:
-    """The solver's term of the node; parts first, without recursion."""
+    """Return the solver's term of the node; parts first, without recursion."""
     for part in parts_first(node):
         if part.term is None:
             part.term = _term(part, [arg.term for arg in part.args if arg.term is not None])
@@ -325,7 +325,7 @@ def _term(node: Node, parts: list[Term]) -> Term:
 
 
 def variables(nodes: Iterable[Node]) -> dict[str, Node]:
-    """The variables below the nodes, by name."""
+    """Return the variables below the nodes, by name."""
     return {node.name: node for node in parts_first(*nodes) if node.op == VARIABLE}
 
 
@@ -335,7 +335,7 @@ def domain(nodes: Iterable[Node]) -> list[Term]:
 
 
 def shown(node: Node) -> Variable:
-    """A variable as one that a witness shows."""
+    """Return a variable as one that a witness shows."""
     return Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
 
 
@@ -345,13 +345,13 @@ def least(
     spare: smt.Budget | None = None,
     known: Mapping[str, Value] | None = None,
 ) -> dict[str, Value] | None:
-    """The least values of variables, in this order, for which what is asserted holds (`encode.least_witness`)."""
+    """Return the least values of variables, in this order, for which what is asserted holds (`encode.least_witness`)."""
     frame = Frame({node.name: term_of(node) for node in nodes})
     return least_witness(solver, map(shown, nodes), frame, spare, known)
 
 
 def model(solver: Solver, nodes: Iterable[Node]) -> dict[str, Value]:
-    """The values of variables in the model of the last satisfiable answer."""
+    """Return the values of variables in the model of the last satisfiable answer."""
     return {node.name: solver.value(term_of(node), node.kind) for node in nodes}
 
 
@@ -380,7 +380,7 @@ class Alike:
     _number_of: dict[Node, int] = field(default_factory=dict)
 
     def number(self, node: Node) -> int:
-        """The number of a node."""
+        """Return the number of a node."""
         for part in parts_first(node, known=self._number_of):
             parts = tuple(self._number_of[arg] for arg in part.args)
             key = part.op, part.kind, part.name, part.low, part.high, parts

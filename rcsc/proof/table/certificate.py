@@ -124,7 +124,7 @@ def _renumbered(node: Shown, number: Mapping[int, int]) -> Shown:
 
 
 def _tests(table: Table, extents: Mapping[str, tuple[int, int]]) -> Iterator[Test]:
-    """Every distinct condition that says anything."""
+    """Yield every distinct condition that excludes some values."""
     return (test for test in table.distinct_tests if test.box != (extents[test.variables[0]],))
 
 

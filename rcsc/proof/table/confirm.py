@@ -18,7 +18,7 @@ from rcsc.proof.table.verdict import Gap, Overlap, TableFinding, Undecided, refu
 
 
 def shown(program: Program, table: Table) -> list[Variable]:
-    """The variables of a witness, in declared order: what the table or its assumptions read."""
+    """Return the variables of a witness, in declared order: those that the table or its assumptions read."""
     assumed = (assumption.condition for assumption in program.assumed(table))
     wanted = set(table.variables).union(*map(read_by, assumed))
     return [variable for variable in program.variables if variable.name in wanted]

@@ -80,7 +80,7 @@ class Space:
     # --- single questions ---
 
     def solver(self, *nodes: Node) -> Solver:
-        """A solver that knows the domain, and that these hold."""
+        """Return a solver that knows the domain, and that these hold."""
         solver = Solver(self.options.limits)
         solver.add(*values.domain(self.nodes.values()), *map(values.term_of, nodes))
         return solver

@@ -79,7 +79,7 @@ def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFindin
 
 
 def _narrows(program: Program, table: Table) -> bool:
-    """Whether an assumption reads what the table's conditions read."""
+    """Return whether an assumption reads a variable of the table's conditions."""
     return any(
         not set(read_by(assumption.condition)).isdisjoint(table.variables)
         for assumption in program.assumed(table)

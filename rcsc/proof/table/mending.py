@@ -269,7 +269,7 @@ class Silent(Nothing):
 
 
 def _matches_one(program: Program, table: Table, witness: WitnessColumn) -> bool:
-    """Whether exactly one line matches an input that none did."""
+    """Return whether exactly one line matches an input that none did."""
     kinds = program.kinds
     values = zip(witness.variables, witness.values, strict=True)
     try:

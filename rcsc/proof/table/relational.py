@@ -205,7 +205,7 @@ class _Decision:
             yield trial.towards(random.choice(points), [*one, *other], kinds, random)
 
     def allowed(self, snapshot: Snapshot) -> frozenset[int] | None:
-        """The lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
+        """Return the lines that match; None where an assumption does not hold, or a condition of a line is not defined."""
         if not all(fold(each.condition, snapshot) for each in self.program.assumed(self.table)):
             return None
         try:

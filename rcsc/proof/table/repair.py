@@ -319,7 +319,7 @@ def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:
 
 
 def _line_of_boxes(program: Program, table: Table, region: Region, words: Words) -> NewLine | None:
-    """The line of a table of boxes whose cells say the region."""
+    """Return the line of a table of boxes whose cells state the region."""
     kinds: dict[str, Scalar] = program.kinds
     told = [cells.cell_under(column, kinds, region) for column in _written(table)]
     said = [cell for cell in told if cell is not None]

@@ -24,7 +24,7 @@ from rcsc.views.diff.sides import Side, pairs
 def compare(
     name: str, before: Program, after: Program, options: Options, *, follow: bool = False
 ) -> ProgramDifference:
-    """What changed between two versions of a program; with `follow`, which lines can follow which, too."""
+    """Return the changes between two versions of a program; with `follow`, also which lines can follow which."""
     alignment = aligned(before, after)
     versions = Versions(alignment, options)
     given_up: tuple[type[BaseException], ...] = (TooLongError, RecursionError, *smt.troubles())
@@ -70,7 +70,7 @@ def compare(
 
 
 def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[ComparedPart]]]]:
-    """What is compared, one after the other, with what to call it where it cannot be decided."""
+    """Yield the comparisons, one after the other, each with a name for one that cannot be decided."""
     old = {str(table.name): table for table in versions.before.tables}
     new = {str(table.name): table for table in versions.after.tables}
     for name in dict.fromkeys((*old, *new)):
@@ -91,7 +91,7 @@ _APART = frozenset({"table", "level", "property", "preprocess", "postprocess"})
 def _with_stops(
     versions: Versions, compared: Sequence[ComparedPart], *, everywhere: bool
 ) -> list[ComparedPart]:
-    """The parts, with a note where assumptions of a table newly stop the cycle, or no longer do.
+    """Return the parts, with a note where assumptions of a table newly stop the cycle, or no longer do.
 
     Args:
         versions: The two programs.
@@ -155,7 +155,7 @@ def _places(program: Program) -> Iterator[tuple[str, tuple[str, ...]]]:
 def difference(
     before: Side, after: Side, options: Options, progress: Callable[[str], None], *, follow: bool = False
 ) -> Difference:
-    """What changed between two sides, program by program; with `follow`, which lines can follow which, too.
+    """Return the changes between two sides, program by program; with `follow`, also which lines can follow which.
 
     Raises:
         NotComparedError: Neither side has a program.

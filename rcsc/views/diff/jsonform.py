@@ -21,7 +21,7 @@ Json = dict[str, Any]
 
 
 def to_json(difference: Difference) -> Json:
-    """The difference as a JSON value."""
+    """Return the difference as a JSON value."""
     return {
         "form": FORM,
         "tool": {"name": "rcsc", "version": __version__},

@@ -52,7 +52,7 @@ class Met:
 def within_reach(
     difference: ProgramDifference, after: Program, level: Level, now: Snapshot, options: Options
 ) -> tuple[Met, ...]:
-    """What of a difference the level's next cycle can come to if it begins in this state; inputs are free.
+    """Return the part of a difference that the level's next cycle can come to if it begins in this state; inputs are free.
 
     Deferred values and `preprocess` are followed as the later version has them. In doubt it is said to come to it: a region
     that its boxes do not say exactly counts as met, and so does what runs after the table; arithmetic on doubles is taken
@@ -99,7 +99,7 @@ def _declared(difference: ProgramDifference) -> Iterator[Met]:
 
 
 def _met(part: ComparedPart, cycle: "_Cycle | None") -> Iterator[Met]:
-    """What of a part is met; all of it where the cycle cannot be followed."""
+    """Return the cases of a part that are met; all of it where the cycle cannot be followed."""
     if part.notes:
         yield Met(part, None)
     for change in part.changes:
@@ -141,7 +141,7 @@ class _Cycle:
         return {name: run.leaf(name) for name in self.kinds}
 
     def reached(self, part: ComparedPart, change: Change) -> bool:
-        """Whether some inputs lead into the region; in doubt they do."""
+        """Return whether some inputs lead into the region; in doubt they do."""
         if not change.where.exact:
             return True
         leaves = self.inputs if part.what == "deferred value" else self.settled
@@ -166,7 +166,7 @@ class _Cycle:
             return True
 
     def _in(self, node: Node, name: str, box: Box) -> Node:
-        """The condition that a leaf lies in part of a region, which may number members of an enumeration otherwise."""
+        """Return the condition that a leaf lies in part of a region, which may number members of an enumeration otherwise."""
         kind, own = self.difference.kinds.get(name, self.kinds[name]), self.kinds[name]
         if isinstance(kind, Enum) and isinstance(own, Enum):
             members = [kind.members[key] for low, high in box for key in range(low, high + 1)]
@@ -179,7 +179,7 @@ class _Cycle:
 
 
 def knows(program: Program, table: Table, leaf: str, value: Value, options: Options) -> bool:
-    """Whether the table has a line, DEFAULT left out, for some input under its assumptions in which the leaf has this value.
+    """Return whether the table has a line, DEFAULT left out, for some input under its assumptions in which the leaf has this value.
 
     Raises:
         UndecidedError: The solver gave up.

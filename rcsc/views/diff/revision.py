@@ -70,14 +70,14 @@ def _is_wanted(path: str) -> bool:
 
 
 def _link(target: Path, to: str, folder: Path) -> None:
-    """A link, unless it leads out of the revision."""
+    """Make a link, unless it leads out of the revision."""
     end = os.path.normpath(os.path.join(target.parent, to))
     if not os.path.isabs(to) and os.path.commonpath([end, folder]) == str(folder):
         target.symlink_to(to)
 
 
 def _entries(tree: str) -> Iterator[Entry]:
-    """Every file of the tree."""
+    """Yield every file of the tree."""
     for line in _git("ls-tree", "-r", "-z", "--full-tree", tree).split(b"\0"):
         about, _, path = line.partition(b"\t")
         if path:
@@ -87,7 +87,7 @@ def _entries(tree: str) -> Iterator[Entry]:
 
 
 def _contents(entries: Sequence[Entry]) -> Iterator[bytes]:
-    """The content of each, all asked at once."""
+    """Yield the content of each, all asked at once."""
     if not entries:
         return
     given = _git("cat-file", "--batch", stdin="".join(f"{entry.blob}\n" for entry in entries).encode())
@@ -100,7 +100,7 @@ def _contents(entries: Sequence[Entry]) -> Iterator[bytes]:
 
 
 def _git(*args: str, stdin: bytes = b"") -> bytes:
-    """The output of git."""
+    """Return the output of git."""
     program = shutil.which("git")
     if program is None:
         raise NotComparedError("git is not installed", "give two files or folders instead of revisions")

@@ -31,7 +31,7 @@ _EVERYWHERE = "every input"
 
 
 def headline(difference: Difference) -> str:
-    """One line: how many tables and other parts changed."""
+    """Return one line: how many tables and other parts changed."""
     parts = [part for _, part in difference.parts()]
     tables = [part for part in parts if part.what == "table"]
     changed = [part for part in tables if part.changed]
@@ -57,7 +57,7 @@ def _count(number: int, noun: str) -> str:
 
 
 def _boxes(where: Where) -> list[str]:
-    """Each box as one text."""
+    """Return each box as one text."""
     return [", ".join(words) or _EVERYWHERE for words in where.words]
 
 
@@ -68,7 +68,7 @@ def _inputs(where: Where) -> str:
 
 
 def _besides(where: Where) -> str:
-    """What boxes alone do not say."""
+    """Return the rest of a region that its boxes alone do not state."""
     if where.also:
         return (
             f"and there: {where.also}" if where.exact else f"part of the region, which is where: {where.also}"
@@ -104,7 +104,7 @@ def _left(value: Value) -> str:
 
 
 def proof(part: ComparedPart) -> str:
-    """What it rests on that nothing else changed."""
+    """Return the grounds on which nothing else changed."""
     if part.basis is Basis.DIGEST:
         return "the same, by digest"
     if part.basis is Basis.SOLVER:
@@ -118,7 +118,7 @@ def _shown(part: ComparedPart) -> bool:
 
 
 def _steps(steps: Sequence[Transition]) -> tuple[list[Transition], int]:
-    """The steps that a trace from the first state leads to, and how many others there are."""
+    """Return the steps that a trace from the first state leads to, and how many others there are."""
     reached = [step for step in steps if step.trace]
     return reached[:MOST_TRANSITIONS], len(steps) - min(len(reached), MOST_TRANSITIONS)
 
@@ -131,7 +131,7 @@ def _trace(step: Transition) -> str:
 
 
 def rows(difference: Difference, *, quiet: bool = False) -> Iterator[Row]:
-    """The difference as text in styled pieces."""
+    """Yield the difference as text in styled pieces."""
     if not quiet:
         yield (TextPiece(f"{escape(difference.before)} -> {escape(difference.after)}", Style.STRONG),)
     for note in difference.notes:
@@ -145,7 +145,7 @@ def rows(difference: Difference, *, quiet: bool = False) -> Iterator[Row]:
 
 
 def _told(program: ProgramDifference) -> bool:
-    """Whether anything is to be said of a program."""
+    """Return whether there is anything to report of a program."""
     shown = any(_shown(part) for part in program.parts)
     return bool(program.changed or program.undecided or program.requirements or shown)
 
@@ -223,7 +223,7 @@ def _followed(follows: Follows) -> Iterator[Row]:
 
 
 def _by_line(pairs: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
-    """The lines that can follow each."""
+    """Return the lines that can follow each."""
     following: dict[str, list[str]] = {}
     for line, then in pairs:
         following.setdefault(line, []).append(then)
@@ -254,7 +254,7 @@ def _traced(traces: Traces) -> Iterator[Row]:
 
 
 def markdown(difference: Difference) -> str:
-    """The difference as a review comment: a summary, a table for each table that changed, and details to open."""
+    """Return the difference as a review comment: a summary, a table for each table that changed, and details to open."""
     lines = [
         f"### rcsc diff: {_cell(headline(difference))}",
         "",
@@ -380,7 +380,7 @@ _MARKS = (("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("](", "]
 
 
 def _cell(text: str) -> str:
-    """Text that ends no cell, marks nothing up, leads nowhere and shows all that it holds; names in pairs of backticks stay set apart."""
+    """Return text that ends no cell, marks nothing up, leads nowhere and shows all that it holds; names in backticks stay set apart."""
     plain = escape(text.replace("\n", " "))
     for mark, replacement in _MARKS:
         plain = plain.replace(mark, replacement)
@@ -388,6 +388,6 @@ def _cell(text: str) -> str:
 
 
 def _code(name: str) -> str:
-    """A name set apart, which cannot end that itself."""
+    """Return a name set apart, which cannot end that itself."""
     plain = escape(name).replace("`", "'").replace("|", "/")
     return f"`{plain}`"

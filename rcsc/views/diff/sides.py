@@ -53,7 +53,7 @@ class Side:
 
 
 def given(argument: str) -> Given:
-    """A file, a folder, or `REV:path` as git has it: from the top, or from where one stands with `./`."""
+    """Return a file, a folder, or `REV:path` as git has it: from the top, or from the present folder with `./`."""
     revision, colon, path = argument.partition(":")
     if os.path.lexists(argument) or not colon or not revision:
         return Given(argument, (argument,))
@@ -70,7 +70,7 @@ def revisions(text: str, paths: Sequence[str]) -> tuple[Given, Given]:
 
 
 def read(asked: Given) -> Side:
-    """The programs of one side.
+    """Return the programs of one side.
 
     Raises:
         NotComparedError: The revision, or a path in it, cannot be had.
@@ -115,7 +115,7 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
 
 
 def _key(root: str, paths: tuple[str, ...]) -> str:
-    """The root file below the folder that it was found in; its own name where it was given itself."""
+    """Return the root file below the folder that it was found in; its own name where it was given itself."""
     for path in paths:
         if os.path.isdir(path):
             below = os.path.relpath(root, path)
@@ -129,7 +129,7 @@ def _renamed(text: str, hidden: str, shown: str) -> str:
 
 
 def _as_given(diagnostic: Diagnostic, hidden: str, shown: str) -> Diagnostic:
-    """The diagnostic with the names that the user knows."""
+    """Return the diagnostic with the names that the user knows."""
 
     def label(at: Label) -> Label:
         return replace(at, span=replace(at.span, file=_renamed(at.span.file, hidden, shown)))

@@ -175,7 +175,7 @@ class _Derivation:
         return f"{' | '.join(left)} || {' | '.join(right)}".strip()
 
     def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
-        """What the line's cells say, the state's left out; of these columns only where they are given."""
+        """Return the cells of a line, the state's left out; of these columns only where they are given."""
         return [
             term
             for column, term in labels.said_by(self.written, self._row(at)).items()
@@ -260,7 +260,7 @@ class _Derivation:
     # --- what is shown ---
 
     def _common(self, edges: list[Edge]) -> list[tree.Expr]:
-        """The terms shared by every edge that leaves a single state."""
+        """Return the terms shared by every edge that leaves a single state."""
         return labels.common([labels.terms_of(edge.guard) for edge in edges if edge.source != ANY])
 
     def _eased(self, edge: Edge, common: list[tree.Expr], values: Mapping[str, Value]) -> Edge:

@@ -38,7 +38,7 @@ class WordsError(Exception):
 
 
 def written_of(file: tree.File, table: Table) -> tree.TableDecl:
-    """The table as the file declares it, with what `above` and `same` add, each in cells of its own."""
+    """Return the table as the file declares it, with what `above` and `same` add, each in cells of its own."""
     return next(
         expanded(declaration, table, apart=True)
         for declaration in file.declarations
@@ -47,13 +47,13 @@ def written_of(file: tree.File, table: Table) -> tree.TableDecl:
 
 
 def said_by(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
-    """What the condition cells of a line say, each with its heading, by column."""
+    """Return the condition cells of a line, each with its heading, by column."""
     cells = enumerate(zip(written.conditions, row.conditions, strict=True))
     return {at: tree.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
 
 
 def common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
-    """The terms that all of several edges share."""
+    """Return the terms that all of several edges share."""
     return [term for term in every[0] if all(term in terms for terms in every)] if len(every) > 1 else []
 
 

@@ -48,7 +48,7 @@ def _of_code(matrix: Matrix, asked: str) -> Iterator[str]:
 
 
 def _narrowest(matrix: Matrix, file: str, line: int) -> Iterator[Piece]:
-    """The pieces around a line of a generated file of which there is none narrower."""
+    """Yield the pieces around a line of a generated file of which there is none narrower."""
     around = [
         piece
         for piece in matrix.pieces

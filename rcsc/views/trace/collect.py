@@ -156,7 +156,7 @@ def _figures(one: Matrix) -> str:
 
 
 def _against(matrices: Sequence[Matrix], path: Path) -> Iterator[Diagnostic]:
-    """What of a kept matrix is of another version."""
+    """Yield the parts of a kept matrix that belong to another version."""
     kept = _kept(path)
     for one in matrices:
         was = kept.get(one.program)

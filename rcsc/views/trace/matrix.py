@@ -267,7 +267,7 @@ class _Build:
     # --- lines ---
 
     def lines(self) -> Iterator[TracedLine]:
-        """Every line of every table."""
+        """Yield every line of every table."""
         for table in self.plan.tables:
             written = {str(line.name): line for line in table.table.lines}
             for line in table.lines:
@@ -333,7 +333,7 @@ class _Build:
     # --- procedures and conditions ---
 
     def declared(self) -> Iterator[Declared]:
-        """Every procedure that something runs, every assumption, invariant and property."""
+        """Yield every procedure that something runs, every assumption, invariant and property."""
         for procedure in self.program.procedures:
             if runs := tuple(self._users(str(procedure.name))):
                 yield self._named("procedure", procedure, procedure.doc, runs, OWES_NOTHING)
@@ -373,7 +373,7 @@ class _Build:
                 yield f"level {level.name}"
 
     def _speaking(self, stated: Property) -> Iterator[Origin]:
-        """The lines that change what a property speaks of."""
+        """Return the lines that change a variable of the property."""
         for table in self.plan.tables:
             for line in table.lines:
                 if self.spoken[stated.name] & set(
@@ -382,7 +382,7 @@ class _Build:
                     yield Origin(Sort.LINE, str(table.table.name), str(line.name))
 
     def called(self, body: Iterable[Statement]) -> dict[str, None]:
-        """The procedures that statements run, calls of calls included."""
+        """Return the procedures that statements run, calls of calls included."""
         names: dict[str, None] = {}
         waiting = [str(call.procedure) for call in everything(body) if isinstance(call, Call)]
         while waiting:
@@ -394,7 +394,7 @@ class _Build:
         return names
 
     def written(self, body: list[Statement]) -> Iterator[str]:
-        """The leaves that statements may write, calls included; a deferred one by its own name."""
+        """Yield the leaves that statements may write, calls included; a deferred one by its own name."""
         for statement in everything(body):
             leaves = (
                 self.procedures[str(statement.procedure)].writes
@@ -404,7 +404,7 @@ class _Build:
             yield from (leaf.removesuffix(".next") for leaf in leaves)
 
     def places(self) -> Iterator[tuple[tuple[str, str], str]]:
-        """Where tables, variables, levels and the program itself are declared."""
+        """Yield where tables, variables, levels and the program itself are declared."""
         yield from (((Sort.TABLE, str(one.name)), self.place(one.span)) for one in self.program.tables)
         yield from (((Sort.VARIABLE, one.name), self.place(one.span)) for one in self.program.declared)
         yield from (((Sort.LEVEL, one.name), self.place(one.span)) for one in self.program.levels)
@@ -418,7 +418,7 @@ class _Build:
 
 
 def _taking(document: VectorSet) -> Mapping[TakenLine, list[int]]:
-    """The numbers of the vectors that take each line."""
+    """Return the numbers of the vectors that take each line."""
     numbers: dict[TakenLine, list[int]] = {}
     for number, lines in enumerate(taken(document.program, document.kept), 1):
         for line in dict.fromkeys(lines):

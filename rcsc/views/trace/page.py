@@ -50,7 +50,7 @@ _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
-    """The page: requirements, then each program forward by lines and backward by code."""
+    """Return the page: requirements, then each program forward by lines and backward by code."""
     links = (f'<a href="#{escape(one.program)}">{escape(one.program)}</a>' for one in matrices)
     body = [
         "<h1>Traceability</h1>",
@@ -70,14 +70,14 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
 
 
 def _table(headings: Mapping[str, int], rows: Iterable[str]) -> str:
-    """A table; the width of each column in per cent."""
+    """Return a table; the width of each column in per cent."""
     columns = "".join(f'<col style="width: {width}%">' for width in headings.values())
     heads = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     return f"<table><colgroup>{columns}</colgroup><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
 def _row(*cells: str, name: str = "") -> str:
-    """A row of cells that are HTML; a name that others can point at."""
+    """Return a row of cells that are HTML; a name that others can point at."""
     mark = f' id="{escape(name)}"' if name else ""
     return f"<tr{mark}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
@@ -155,7 +155,7 @@ def _line(matrix: Matrix, line: TracedLine) -> str:
 
 
 def _place(place: str) -> str:
-    """A place that breaks between folders, file and number, never in one of them."""
+    """Return a place that breaks between folders, file and number, never in one of them."""
     file, colon, number = place.rpartition(":")
     file, number = (f"{file}:", number) if colon and number.isdigit() else (place, "")
     *folders, name = file.split("/")
@@ -164,12 +164,12 @@ def _place(place: str) -> str:
 
 
 def _unbroken(words: str) -> str:
-    """A name or numbers that stay on one line: a column grows with its longest."""
+    """Return a name or numbers that stay on one line: a column grows with its longest."""
     return f'<span class="at">{escape(words)}</span>'
 
 
 def _numbered(word: str, numbers: Sequence[int]) -> str:
-    """Numbers of vectors, neighbours joined: `3-5, 9`."""
+    """Return numbers of vectors, neighbours joined: `3-5, 9`."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -181,7 +181,7 @@ def _numbered(word: str, numbers: Sequence[int]) -> str:
 
 
 def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...]) -> str:
-    """The places of a line's code, the words before them soft; what only numbers it is left out."""
+    """Return the places of a line's code, the words before them soft; what only numbers it is left out."""
     rows = []
     for word, pieces in code:
         for file, runs in spots(piece for piece in pieces if piece.file.endswith(ends)):
@@ -202,7 +202,7 @@ def _declared(one: Declared) -> str:
 
 
 def _code(matrix: Matrix) -> Iterator[str]:
-    """Each generated file back to the tables, neighbours of one origin joined."""
+    """Yield each generated file back to the tables, neighbours of one origin joined."""
     yield "<h3>Generated code, back to the tables</h3>"
     widths = {"lines": 9, "called": 27, "comes from": 34, "where": 18, "for": 12}
     for file, pieces in groupby(

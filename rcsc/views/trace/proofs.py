@@ -21,7 +21,7 @@ _SAID = {
 
 
 def table_proofs(reports: Iterable[TableReport]) -> dict[str, TableProof]:
-    """What the check of each table says, by its name."""
+    """Return the verdict of each table, by its name."""
     return {one.table: TableProof(one.verdict.value, _method(one), one.assumptions) for one in reports}
 
 
@@ -32,7 +32,7 @@ def _method(table: TableReport) -> str:
 
 
 def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
-    """What earlier proofs of the levels together say of each property; those that nobody proved are left out."""
+    """Return the verdicts of earlier proofs of the levels together on each property; those that nobody proved are left out."""
     if not program.properties:
         return {}
     return dict(_known(program, cache))

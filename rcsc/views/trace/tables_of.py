@@ -38,7 +38,7 @@ def spots(pieces: Iterable[Piece]) -> Iterator[tuple[str, list[tuple[int, int]]]
 
 
 def lines_csv(matrices: Iterable[Matrix]) -> str:
-    """One row for each line of each table."""
+    """Return one row for each line of each table."""
     rows: list[Sequence[object]] = [FORWARD]
     rows += [_forward(matrix, line) for matrix in matrices for line in matrix.lines]
     return csv_text(rows)
@@ -59,7 +59,7 @@ def _forward(matrix: Matrix, line: TracedLine) -> list[object]:
 
 
 def code_csv(matrices: Iterable[Matrix]) -> str:
-    """One row for each piece of each generated file; a file that several programs share once."""
+    """Return one row for each piece of each generated file; a file that several programs share once."""
     rows = dict.fromkeys(_backward(matrix, piece) for matrix in matrices for piece in matrix.pieces)
     return csv_text([BACKWARD, *rows])
 
@@ -73,7 +73,7 @@ def _backward(matrix: Matrix, piece: Piece) -> tuple[object, ...]:
 
 
 def requirements_csv(matrices: Sequence[Matrix], wanted: Sequence[str]) -> str:
-    """One row for each requirement and place; a listed one that nothing names stands alone."""
+    """Return one row for each requirement and place; a listed one that nothing names stands alone."""
     known = places(matrices)
     rows: list[Sequence[object]] = [("requirement", "place")]
     for name in dict.fromkeys((*wanted, *known)):
@@ -85,7 +85,7 @@ def requirements_csv(matrices: Sequence[Matrix], wanted: Sequence[str]) -> str:
 
 
 def to_json(matrices: Sequence[Matrix], wanted: Sequence[str]) -> dict[str, Any]:
-    """All of it as a JSON value."""
+    """Return all of it as a JSON value."""
     return {
         "form": FORM,
         "tool": {"name": "rcsc", "version": __version__},

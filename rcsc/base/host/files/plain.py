@@ -52,13 +52,13 @@ class Kept:
 
 
 def _names(kept: Any) -> list[str]:
-    """The fields of a dataclass, or of one of its objects, that are state."""
+    """Return the fields of a dataclass, or of one of its objects, that are state."""
     left: frozenset[str] = getattr(kept, "transient", frozenset())
     return [field.name for field in fields(kept) if field.name not in left]
 
 
 def plain(value: Any) -> Any:
-    """The value in plain form, as JSON has it.
+    """Return the value in plain form, as JSON has it.
 
     Raises:
         TypeError: It could not be read back.
@@ -77,7 +77,7 @@ def plain(value: Any) -> Any:
 
 
 def read(kind: Any, value: Any) -> Any:
-    """The value of a declared type that `plain` turned into this.
+    """Return the value of a declared type that `plain` turned into this.
 
     Raises:
         ValueError: It is the plain form of no such value.
@@ -109,7 +109,7 @@ def read(kind: Any, value: Any) -> Any:
 
 
 def _bounded(value: Any) -> Any:
-    """The value, unless it is a number out of bounds; NaN is a reading that could not be taken."""
+    """Return the value, unless it is a number out of bounds; NaN is a reading that could not be taken."""
     large = (isinstance(value, int) and abs(value) > MOST_WHOLE) or (
         isinstance(value, float) and abs(value) > MOST_REAL
     )
@@ -129,7 +129,7 @@ def _shown(value: Any) -> str:
 
 
 def alike(now: Any, then: Any) -> bool:
-    """Whether two values have the same shape: tuples of one length, values of one type, declared or not."""
+    """Return whether two values have the same shape: tuples of one length, values of one type, declared or not."""
     if isinstance(now, tuple):
         return isinstance(then, tuple) and len(now) == len(then) and all(map(alike, now, then))
     if is_dataclass(now):
@@ -140,7 +140,7 @@ def alike(now: Any, then: Any) -> bool:
 
 
 def finite(value: Any) -> bool:
-    """Whether every number in a plain value is finite."""
+    """Return whether every number in a plain value is finite."""
     if isinstance(value, Mapping):
         return all(map(finite, value.values()))
     if isinstance(value, (list, tuple)):
@@ -155,7 +155,7 @@ def _items(value: Any) -> Sequence[Any]:
 
 
 def _any(kinds: Sequence[Any], value: Any) -> Any:
-    """The value as the first of several types that reads it."""
+    """Return the value as the first of several types that reads it."""
     for kind in kinds:
         try:
             return None if kind is type(None) and value is None else read(kind, value)

@@ -132,7 +132,7 @@ def standard_input() -> BinaryIO:
 
 
 def typed() -> bool:
-    """Whether a person types and reads: standard input and output are a terminal."""
+    """Return whether a person types and reads: standard input and output are a terminal."""
     return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
 
 
@@ -262,7 +262,7 @@ def xml_of(text: str) -> "Element":
 
 
 def _shallow() -> Any:
-    """A builder of the elements of an XML text, up to a depth."""
+    """Return a builder of the elements of an XML text, up to a depth."""
     from xml.etree import ElementTree as ET
 
     class Shallow(ET.TreeBuilder):

@@ -81,7 +81,7 @@ def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr],
 
 
 def _inside(program: Program, region: Region | None, witness: Witness) -> bool:
-    """Whether a witness lies in a region of variables; not where it is one of bits."""
+    """Return whether a witness lies in a region of variables; not where it is one of bits."""
     kinds = program.kinds
     return region is not None and all(
         name in witness and holds(box, key_of(kinds[name], witness[name])) for name, box in region.items()
@@ -92,7 +92,7 @@ def _inside(program: Program, region: Region | None, witness: Witness) -> bool:
 
 
 def grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """The overlaps; of those that come of the same cells, to one end, the first tells the others in a note."""
+    """Return the overlaps; of those that come of the same cells, to one end, the first tells the others in a note."""
     groups: dict[object, list[int]] = {}
     for at, (overlap, diagnostic) in enumerate(zip(overlaps, shown, strict=False)):
         cells = _apart_in(table, overlap)
@@ -110,7 +110,7 @@ def grouped(table: Table, overlaps: Sequence[Overlap], shown: Sequence[Diagnosti
 
 
 def _apart_in(table: Table, overlap: Overlap) -> frozenset[tuple[str, str]]:
-    """The cells of two lines in columns where just one of them says something: what brings them together."""
+    """Return the cells of two lines in columns where just one of them has a condition: these bring them together."""
     pair = table.lines[overlap.first], table.lines[overlap.second]
     cells = zip(table.columns, *(line.tests for line in pair), strict=True)
     return frozenset(
@@ -139,7 +139,7 @@ def _alike_as(table: Table, overlaps: Sequence[Overlap], first: Overlap) -> str:
 
 
 def _said_under(heading: str, text: str) -> str:
-    """A cell with its heading: `called = abort`, `now in cleared`."""
+    """Return a cell with its heading: `called = abort`, `now in cleared`."""
     if heading == "when":
         return text
     plain = re.match(r"[\w.]+$|-\d", text) is not None
@@ -147,5 +147,5 @@ def _said_under(heading: str, text: str) -> str:
 
 
 def names_of(names: Iterable[str]) -> str:
-    """Names for a message: `a`, `b`."""
+    """Return names for a message: `a`, `b`."""
     return ", ".join(f"`{name}`" for name in names)

@@ -91,7 +91,7 @@ def kind_of(kinds: Mapping[str, Scalar], name: str) -> Scalar:
 
 
 def words_of(program: Program, table: Table) -> Words | None:
-    """The words that the table's tests take apart; None where some test is no box, of leaves or of parts."""
+    """Return the words that the table's tests take apart; None where some test is no box of leaves or parts."""
     kinds: dict[str, Scalar] = program.kinds
     tests = table.distinct_tests
     looked_at: dict[str, list[Test]] = {}

@@ -63,7 +63,7 @@ class Aligned:
 
 
 def aligned(before: Program, after: Program) -> Aligned:
-    """The two versions over what they have in common."""
+    """Return the two versions over the values that they share."""
     changes = tuple(_declarations(before, after))
     numbering = _numbering(before, after)
     old, new = (
@@ -84,7 +84,7 @@ def aligned(before: Program, after: Program) -> Aligned:
 
 
 def _both(first: Scalar, second: Scalar, shared: "Mapping[Enum, _Members]") -> Scalar | None:
-    """The values of both types; None where they are of different kinds, or have none in common."""
+    """Return the values of both types; None where they are of different kinds, or have none in common."""
     match first, second:
         case Int(unit=unit), Int(unit=other) if unit == other:
             low, high = max(first.low, second.low), min(first.high, second.high)
@@ -158,7 +158,7 @@ class _Rewriter:
         )
 
     def any(self, value: Any) -> Any:
-        """Any part of the model."""
+        """Return any part of the model."""
         if isinstance(value, Enum):
             return self.members[value].whole if value in self.members else value
         if isinstance(value, tuple):
@@ -232,12 +232,12 @@ def _changed(what: str, before: Mapping[str, str], after: Mapping[str, str]) -> 
 
 
 def _is_pending(variable: Variable) -> bool:
-    """Whether the variable is the leaf of a deferred value: declared with its variable."""
+    """Return whether the variable is the leaf of a deferred value: declared with its variable."""
     return variable.name.endswith(".next")
 
 
 def _declared(variable: Variable) -> str:
-    """The declaration in the language's words, without what it says of its deferred value."""
+    """Return the declaration in the language's words, without its deferred value."""
     unit = variable.type.unit if isinstance(variable.type, Int | Real) else ()
     stated = f" [{unit_text(unit)}]" if unit else ""
     first = spell(variable.type, variable.initial)
@@ -248,7 +248,7 @@ def _declared(variable: Variable) -> str:
 
 
 def kind_said(kind: Scalar) -> str:
-    """The type in the language's words."""
+    """Return the type in the language's words."""
     match kind:
         case Enum(name=name):
             return name

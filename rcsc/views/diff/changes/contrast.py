@@ -50,7 +50,7 @@ class Contrast:
         return self.versions.shared.canonical(values.any_of(self.differ.values()))
 
     def everywhere(self) -> bool:
-        """Whether some leaf differs all over the region.
+        """Return whether some leaf differs all over the region.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -62,7 +62,7 @@ class Contrast:
         return any(not versions.possible(self.region, values.negation(node)) for node in easy)
 
     def where(self, wanted: Node) -> Where:
-        """The part of the region in which they differ and that holds all of `wanted`.
+        """Return the part of the region in which they differ and that holds all of `wanted`.
 
         Boxes of that part where they end soon; else boxes of the region, and what must hold there besides.
 
@@ -85,7 +85,7 @@ class Contrast:
         return replace(around, also=also, inputs=None)
 
     def _besides(self) -> str:
-        """Where they differ, as a condition in words; the leaves' names where that would be too long."""
+        """Return where they differ, as a condition in words; the leaves' names where that would be too long."""
         parts: list[str] = []
         long: list[str] = []
         for leaf, node in self.differ.items():
@@ -100,7 +100,7 @@ class Contrast:
     # --- what is left otherwise ---
 
     def left(self, wanted: Node, hit: Hit) -> tuple[Value, ...]:
-        """The leaves that differ somewhere in `wanted`, in declared order.
+        """Return the leaves that differ somewhere in `wanted`, in declared order.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -143,7 +143,7 @@ class Contrast:
 def _ended(
     versions: Versions, program: Program, doing: Doing, point: Mapping[str, Scalars]
 ) -> dict[str, Scalars] | None:
-    """The state after a run by the reference meaning; None where it goes wrong, or would run the user's code."""
+    """Return the state after a run by the reference meaning; None where it goes wrong, or would run the user's code."""
     if doing.effect.calls:
         return None
     now = versions.snapshot(program, point)
@@ -155,7 +155,7 @@ def _ended(
 
 
 def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Contrast:
-    """Where the two effects differ within a region.
+    """Return the places within a region where the two effects differ.
 
     Raises:
         UndecidedError: The solver gave up.
@@ -172,7 +172,7 @@ def changes(
     versions: Versions, sort: PartSort, labels: tuple[str, str], region: Node, relied: Node = TRUE,
     against: Contrast | None = None,
 ) -> list[Change]:  # fmt: skip
-    """A region as changes: where some version's assumptions hold, and the rest apart.
+    """Return a region as changes: where some version's assumptions hold, and the rest apart.
 
     Args:
         versions: Of what.

@@ -52,7 +52,7 @@ Steps = Mapping[GraphStep, Node]
 
 
 def traces(versions: Versions) -> Iterator[Traces]:
-    """Every level that both versions have.
+    """Yield every level that both versions have.
 
     Raises:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
@@ -64,7 +64,7 @@ def traces(versions: Versions) -> Iterator[Traces]:
 
 
 def _level(versions: Versions, pair: tuple[Level, Level]) -> Traces:
-    """One level: steps of tables that changed, compared."""
+    """Compare the steps of one level's changed tables."""
     new: list[Transition] = []
     gone: list[Transition] = []
     programs = versions.before, versions.after
@@ -106,7 +106,7 @@ def _states(versions: Versions) -> list[str]:
 
 
 def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[tuple[GraphStep, Node]]:
-    """Every step of the table, each once, in order of its lines."""
+    """Yield every step of the table, each once, in order of its lines."""
     meaning = versions.meanings()[side]
     known = assumed(table, meaning)
     for line, when in zip(table.every_line, meaning.every_line(table), strict=True):
@@ -138,7 +138,7 @@ def _only(versions: Versions, state: str, here: Steps, there: Steps, first: str)
 
 
 def _trace(steps: Iterable[GraphStep], first: str, last: str, then: GraphStep) -> tuple[tuple[str, str], ...]:
-    """The shortest way from the first state to the step, by steps of its table: each state with the line that leads on."""
+    """Return the shortest way from the first state to the step, by steps of its table: each state with the line that leads on."""
     edges: dict[str, list[GraphStep]] = {}
     for step in steps:
         if step.table == then.table:
@@ -160,7 +160,7 @@ def _trace(steps: Iterable[GraphStep], first: str, last: str, then: GraphStep) -
 
 
 def follows(versions: Versions) -> Iterator[Follows]:
-    """Every table that both versions have and a level runs, where its pairs may differ."""
+    """Yield every table that both versions have and a level runs, where its pairs may differ."""
     later = {level.name: level for level in versions.after.levels}
     for level in versions.before.levels:
         if level.name not in later:
@@ -177,7 +177,7 @@ def follows(versions: Versions) -> Iterator[Follows]:
 
 
 def _around(digests: Digests, level: Level) -> object:
-    """What a cycle does besides the table: a change of it may change the pairs of every table."""
+    """Return the work of a cycle besides the table: a change of it may change the pairs of every table."""
     bodies: list[list[Statement]] = [
         [Call(ProcedureName(name)) for name in part] for part in (level.preprocess, level.postprocess)
     ]

@@ -216,7 +216,7 @@ class Difference:
         return any(program.undecided for program in self.programs)
 
     def parts(self) -> Iterator[tuple[ProgramDifference, ComparedPart]]:
-        """Every part with its program."""
+        """Yield every part with its program."""
         for program in self.programs:
             for part in program.parts:
                 yield program, part

@@ -43,7 +43,7 @@ from rcsc.views.diff.changes.versions import Doing, Runner, Versions
 
 
 def procedures(versions: Versions) -> Iterator[ComparedPart]:
-    """Every procedure that both versions have, called with the same arguments.
+    """Yield every procedure that both versions have, called with the same arguments.
 
     Raises:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
@@ -77,12 +77,12 @@ def _procedure(versions: Versions, old: Procedure, new: Procedure) -> ComparedPa
 
 
 def _kind(kind: Scalar) -> object:
-    """The type without its bounds."""
+    """Return the type without its bounds."""
     return (type(kind), kind.unit) if isinstance(kind, Int | Real) else kind
 
 
 def _narrower(first: Scalar, second: Scalar) -> Scalar:
-    """The values of both types, one kind."""
+    """Return the values of both types, one kind."""
     match first, second:
         case Int(), Int():
             return Int(max(first.low, second.low), min(first.high, second.high), first.unit)
@@ -103,7 +103,7 @@ def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None
 def _effects(
     versions: Versions, what: str, name: str, pair: tuple[Effect, Effect], runners: tuple[Runner, Runner]
 ) -> ComparedPart:
-    """Where two effects differ, all inputs free."""
+    """Return where two effects differ, all inputs free."""
     before = versions.tally.queries
     old, new = (Doing(effect, run, {}) for effect, run in zip(pair, runners, strict=True))
     contrasted = contrast(versions, TRUE, (old, new))
@@ -117,7 +117,7 @@ def _effects(
 
 
 def levels(versions: Versions) -> Iterator[ComparedPart]:
-    """Every level that both versions have: period, which table runs when, and what runs before and after it.
+    """Yield every level that both versions have: period, which table runs when, and what runs before and after it.
 
     Raises:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
@@ -136,7 +136,7 @@ def levels(versions: Versions) -> Iterator[ComparedPart]:
 
 
 def _level(old: Level, new: Level) -> Iterator[str]:
-    """What changed of the level itself."""
+    """Return the changes of the level itself."""
     if old.period_ms != new.period_ms:
         yield f"period: {old.period_ms} ms, now {new.period_ms} ms"
     first, second = _chosen(old), _chosen(new)
@@ -150,7 +150,7 @@ def _level(old: Level, new: Level) -> Iterator[str]:
 
 
 def _stages(level: Level) -> str:
-    """What runs before the last table, in order."""
+    """Return the work before the last table, in order."""
     return ", ".join(" or ".join(f"`{name}`" for name in stage.names) for stage in level.stages) or "none"
 
 
@@ -168,7 +168,7 @@ def _selector(level: Level) -> Expr | None:
 def _sequence(
     versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> ComparedPart:
-    """What runs before a level's table, or after it, as one run."""
+    """Return the work before a level's table, or after it, as one run."""
     made = keeps(versions.before), keeps(versions.after)
     bodies: list[list[Statement]] = [
         [Call(ProcedureName(name)) for name in part if not own(name)]
@@ -214,7 +214,7 @@ _WORDS = {"doc": "", "text": "", "box": None}
 
 
 def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[ComparedPart]:
-    """Every difference that a walk over all fields shows and that is neither reported yet nor compared.
+    """Yield every difference that a walk over all fields shows and that is neither reported yet nor compared.
 
     Procedures that only one version has are left out: what they do shows where they are called.
 
@@ -254,7 +254,7 @@ def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[Compared
 
 
 def _restarts(before: Program, after: Program) -> Iterator[ComparedPart]:
-    """Every variable of both versions that a restart finds otherwise."""
+    """Yield every variable of both versions that a restart finds otherwise."""
     old, new = dict(before.restart or ()), dict(after.restart or ())
     shared = {variable.name for variable in before.variables} & {
         variable.name for variable in after.variables
@@ -265,14 +265,14 @@ def _restarts(before: Program, after: Program) -> Iterator[ComparedPart]:
 
 
 def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
-    """A digest of a member without what is compared; an enumeration stands for itself."""
+    """Return a digest of a member without what is compared; an enumeration stands for itself."""
     left_out = {*compared, *_WORDS}
     kept = (getattr(member, f.name) for f in fields(member) if f.compare and f.name not in left_out)
     return digest(tuple(_bare(value, whole=isinstance(member, Enum)) for value in kept))
 
 
 def _bare(value: Any, *, whole: bool = False) -> Any:
-    """The value without words; a type by its name, since its members are compared by themselves."""
+    """Return the value without words; a type by its name, since its members are compared by themselves."""
     if isinstance(value, tuple):
         return tuple(_bare(part) for part in value)
     if isinstance(value, Enum) and not whole:
@@ -314,7 +314,7 @@ def conditions(versions: Versions) -> Iterator[ComparedPart]:
 
 
 def _properties(versions: Versions) -> Iterator[ComparedPart]:
-    """Each property, with its words where it is new, gone, or says something else."""
+    """Yield each property, with its text where it is new, gone or changed."""
     old, new = ({p.name: p for p in version.properties} for version in (versions.before, versions.after))
     for name in dict.fromkeys((*old, *new)):
         if name not in new or name not in old:
@@ -327,7 +327,7 @@ def _properties(versions: Versions) -> Iterator[ComparedPart]:
 
 
 def _words(stated: Property) -> str:
-    """What a property says, in one line."""
+    """Return a property's text, in one line."""
     return " ".join(stated.text.split())
 
 
@@ -340,7 +340,7 @@ def _deferred(program: Program) -> dict[str, Expr]:
 
 
 def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]) -> ComparedPart:
-    """Where a condition was true and is not now, and the other way."""
+    """Return where a condition was true and is not now, and the other way."""
     if repr(pair[0]) == repr(pair[1]):
         return ComparedPart(what, name, basis=Basis.DIGEST)
     read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
@@ -360,7 +360,7 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
 
 
 def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:
-    """Where the condition is true, false and, called as given, undefined."""
+    """Return where the condition is true, false and, called as given, undefined."""
     holds = meaning.condition(condition)
     good = values.all_of(values.negation(bad) for bad in meaning.bad)
     regions = {"true": values.both(good, holds), "false": values.both(good, values.negation(holds))}

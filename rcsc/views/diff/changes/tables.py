@@ -20,7 +20,7 @@ from rcsc.views.diff.changes.versions import Doing, Versions, is_hard
 
 
 def table_part(versions: Versions, before: Table, after: Table) -> ComparedPart:
-    """What changed between two versions of a table.
+    """Return the changes between two versions of a table.
 
     Raises:
         UndecidedError: The solver gave up.
@@ -37,7 +37,7 @@ def table_part(versions: Versions, before: Table, after: Table) -> ComparedPart:
 
 
 def _claims(before: Table, after: Table) -> Iterator[str]:
-    """What changed of a table that no region shows: the assumptions that it may rely on, and its DEFAULT."""
+    """Return the changes of a table that no region shows: the assumptions that it may rely on, and its DEFAULT."""
     gone = [name for name in before.assumptions if name not in after.assumptions]
     new = [name for name in after.assumptions if name not in before.assumptions]
     yield from (f"no longer assumes `{name}`" for name in gone)
@@ -79,7 +79,7 @@ class _Comparison:
         self.relied = versions.shared.canonical(values.any_of(map(assumed, self.tables, versions.meanings())))
 
     def part(self) -> ComparedPart:
-        """The table as a part: everything that changed."""
+        """Return the table as a part: everything that changed."""
         versions, before = self.versions, self.versions.tally.queries
         changed: list[Change] = []
         moved: list[Change] = []
@@ -98,7 +98,7 @@ class _Comparison:
         )  # fmt: skip
 
     def _bodies_differ(self, before: Outcome, after: Outcome) -> bool:
-        """Whether a line's actions, and all that they call, are not word for word the same."""
+        """Return whether a line's actions, and all that they call, are not word for word the same."""
         if before.actions is None or after.actions is None:
             return False
         bodies = [_body(out.actions) for out in (before, after)]
@@ -108,7 +108,7 @@ class _Comparison:
         return first != second
 
     def _pairs(self, kept: list[tuple[Outcome, Outcome]]) -> list[tuple[Outcome, Outcome]]:
-        """Every pair of outcomes with different names that some input has."""
+        """Return every pair of outcomes with different names that some input has."""
         versions = self.versions
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         solver = space.solver(
@@ -125,7 +125,7 @@ class _Comparison:
         return pairs
 
     def _compared(self, before: Outcome, after: Outcome) -> list[Change]:
-        """What changed where one version has the first outcome and the other the second."""
+        """Return the changes where one version has the first outcome and the other the second."""
         versions = self.versions
         both = versions.shared.canonical(values.both(before.when, after.when))
         if both not in versions.stated:
@@ -151,7 +151,7 @@ class _Comparison:
         return self._confirmed(changed, before, after)
 
     def _moved(self, labels: tuple[str, str], both: Node, contrasted: Contrast) -> list[Change]:
-        """Where another line has the same effect; not looked for where doubles are computed with."""
+        """Return where another line has the same effect; not looked for where doubles are computed with."""
         versions = self.versions
         if not contrasted.differ:
             return changes(versions, PartSort.LINE, labels, both)
@@ -189,13 +189,13 @@ class _Comparison:
 
 
 def assumed(table: Table, meaning: Meaning) -> Node:
-    """The condition that the table's assumptions and the program's invariants hold."""
+    """Return the condition that the table's assumptions and the program's invariants hold."""
     invariants = (meaning.condition(invariant.condition) for invariant in meaning.program.invariants)
     return values.all_of([*meaning.assumed(table), *invariants])
 
 
 def _outcomes(table: Table, meaning: Meaning) -> dict[tuple[bool, str], Outcome]:
-    """What can become of an input, in order of the table; equal outcomes of two versions have equal keys."""
+    """Return the possible outcomes of an input, in order of the table; equal outcomes of two versions have equal keys."""
 
     def joined(parts: Sequence[Node]) -> Node:
         return meaning.shared.canonical(values.all_of(reversed(parts)))
@@ -204,7 +204,7 @@ def _outcomes(table: Table, meaning: Meaning) -> dict[tuple[bool, str], Outcome]
 
 
 def _label(table: Table, out: Outcome) -> str:
-    """The outcome in words: `line 3`, or the fault."""
+    """Return the outcome in words: `line 3`, or the fault."""
     if out.actions is None:
         return "a condition that is undefined" if out.name == UNDEFINED else out.name
     default = table.default is not None and table.default.name == out.name

@@ -14,7 +14,7 @@ class _TooLongError(Exception):
 
 
 def in_words(node: Node, kind: Scalar | None = None) -> str | None:
-    """The value in words; `kind` is what it is kept as, where that says more than the node."""
+    """Return the value in words; `kind` is the type that it is kept as, where that has more names than the node's."""
     try:
         text = _worded(node, kind or node.kind, 0)
     except _TooLongError:
@@ -63,7 +63,7 @@ def _operation(node: Node, depth: int) -> str:
 
 
 def _negated(node: Node, depth: int) -> str:
-    """Negations are moved inward, since `or` and `/=` are kept as negations."""
+    """Spell a negation, moved inward, since `or` and `/=` are kept as negations."""
     turned = {Op.EQ: Op.NE, Op.LT: Op.GE, Op.LE: Op.GT}
     if node.op == Op.AND:
         sides = [
@@ -80,13 +80,13 @@ def _negated(node: Node, depth: int) -> str:
 
 
 def _fuller(kinds: list[Scalar]) -> Scalar:
-    """The enumeration with the most members: one side may know those in common only."""
+    """Return the enumeration with the most members: one side may know those in common only."""
     enums = [kind for kind in kinds if isinstance(kind, Enum)]
     return max(enums, key=lambda enum: len(enum.members)) if enums else kinds[0]
 
 
 def number(kind: Scalar, value: Value) -> str:
-    """A value of the kind; a number where the kind has no such value."""
+    """Return a value of the kind; a number where the kind has no such value."""
     if isinstance(kind, Enum) and not 0 <= int(value) < len(kind.members):
         return str(int(value))
     return spell(kind, value)

@@ -53,7 +53,7 @@ Runner = Callable[[Program, dict[str, Scalars]], None]
 
 
 def _expressions(program: Program) -> Iterator[Expr]:
-    """What a version looks at and calculates."""
+    """Yield the expressions that a version tests and calculates."""
     for stated in (program.assumptions, program.invariants, program.properties):
         yield from (each.condition for each in stated)
     for table in program.tables:
@@ -118,11 +118,11 @@ class Versions:
         self._points: list[dict[str, Scalars]] = []
 
     def meanings(self) -> tuple[Meaning, Meaning]:
-        """What conditions and actions of either version mean."""
+        """Return the meanings of conditions and actions of either version."""
         return Meaning(self.before, self.shared), Meaning(self.after, self.shared)
 
     def space(self, *nodes: Node) -> Space:
-        """All inputs that the nodes speak of."""
+        """Return all inputs that the nodes speak of."""
         inputs = values.variables(nodes)
         self.seen.update(inputs)
         variables = sorted(
@@ -131,7 +131,7 @@ class Versions:
         return Space(variables, self.options, self.tally)
 
     def possible(self, *nodes: Node) -> bool:
-        """Whether the conditions can hold together.
+        """Return whether the conditions can hold together.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -144,7 +144,7 @@ class Versions:
     # --- regions ---
 
     def meet(self, easy: Node, hard: Node) -> bool:
-        """Whether both can hold together.
+        """Return whether both can hold together.
 
         Args:
             easy: Made of comparisons.
@@ -157,7 +157,7 @@ class Versions:
         return self._hit(easy, whole) is not None if is_hard(whole) else self.possible(whole)
 
     def hit(self, easy: Node, hard: Node) -> Hit | None:
-        """An input at which both hold, the least where doubles are not computed with; None where there is none.
+        """Return an input at which both hold, the least where doubles are not computed with; None where there is none.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -168,7 +168,7 @@ class Versions:
         return Hit(self.witness(whole), least=True) if self.possible(whole) else None
 
     def _hit(self, easy: Node, whole: Node) -> Hit | None:
-        """An input: one known already, one found by trial, or the solver's."""
+        """Return an input: one known already, one found by trial, or the solver's."""
         if whole not in self._hits:
             known = next((point for point in self._points if self._holds(whole, point)), None)
             if known is None and self.possible(easy):
@@ -178,7 +178,7 @@ class Versions:
         return self._hits[whole]
 
     def _holds(self, whole: Node, point: dict[str, Scalars]) -> bool:
-        """Whether the condition holds at an input; it is completed by the least values of other variables."""
+        """Return whether the condition holds at an input; it is completed by the least values of other variables."""
         for name, node in values.variables([whole]).items():
             self.seen[name] = node
             if name not in point:
@@ -193,7 +193,7 @@ class Versions:
         return values.model(solver, space.nodes.values())
 
     def _tried(self, easy: Node, whole: Node) -> dict[str, Scalars] | None:
-        """An input found by trial: the least one of what is easy, and values of the other variables."""
+        """Return an input found by trial: the least one of what is easy, and values of the other variables."""
         fixed = self.witness(easy)
         named = values.variables([whole])
         self.seen.update(named)
@@ -209,7 +209,7 @@ class Versions:
         return {name: bool(at) if isinstance(named[name].kind, Bool) else at for name, at in point.items()}
 
     def where(self, wanted: Node, allowed: Node, most: int = MOST_BOXES) -> Where:
-        """The region in words: boxes that hold all of `wanted`, as far as `most` do, and lie within `allowed`.
+        """Return the region in words: boxes that hold all of `wanted`, as far as `most` do, and lie within `allowed`.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -238,7 +238,7 @@ class Versions:
         return {name: self.seen[name].kind for name in box}
 
     def inside(self, boxes: Iterable[Region]) -> Node:
-        """The condition that an input lies in one of the boxes."""
+        """Return the condition that an input lies in one of the boxes."""
         return values.any_of(
             values.all_of(self._in_part(name, part) for name, part in box.items()) for box in boxes
         )
@@ -249,7 +249,7 @@ class Versions:
         return values.any_of(values.inside(node, low, high) for low, high in ends)
 
     def witness(self, wanted: Node) -> dict[str, Scalars]:
-        """The least input in a region that has one.
+        """Return the least input in a region that has one.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -257,11 +257,11 @@ class Versions:
         return self.space(wanted).witness(wanted)
 
     def spelled(self, witness: Mapping[str, Scalars]) -> tuple[tuple[str, str], ...]:
-        """An input in words."""
+        """Spell an input in words."""
         return tuple((name, number(self.seen[name].kind, value)) for name, value in witness.items())
 
     def snapshot(self, program: Program, witness: Mapping[str, Scalars]) -> dict[str, Scalars]:
-        """The witness, and the initial value of every leaf that it leaves open."""
+        """Return the witness, and the initial value of every leaf that it leaves open."""
         given = {name: value for name, value in witness.items() if name in self.kinds}
         return {**initial(program), **given}
 
@@ -270,7 +270,7 @@ _HARD = ROUNDED | {Op.TO_REAL, Op.TO_SINGLE}
 
 
 def is_hard(condition: Node) -> bool:
-    """Whether the condition computes with doubles."""
+    """Return whether the condition computes with doubles."""
     return any(
         (node.op in _HARD and isinstance(node.kind, Real)) or node.op == Op.TO_INT
         for node in values.parts_first(condition)
@@ -278,7 +278,7 @@ def is_hard(condition: Node) -> bool:
 
 
 def is_across(condition: Node) -> bool:
-    """Whether the condition compares two variables of more than a few values each."""
+    """Return whether the condition compares two variables of more than a few values each."""
     for node in values.parts_first(condition):
         if node.op in COMPARISONS:
             left, right = node.args
@@ -289,6 +289,6 @@ def is_across(condition: Node) -> bool:
 
 
 def run_by(program: Program, level: Level) -> dict[str, Table]:
-    """The tables that a level runs, by name."""
+    """Return the tables that a level runs, by name."""
     named = {table.name: table for table in program.tables}
     return {str(name): named[name] for name in level.table_names}

@@ -23,7 +23,7 @@ _WORDS = ("line", "does", "decided", "default")
 
 
 def write(graph: StateGraph) -> str:
-    """The graph as SCXML."""
+    """Return the graph as SCXML."""
     whole = free("any", graph.states)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>']
     about = "".join(f"\n    rcsc:{word}={quoteattr(text)}" for word, text in header(graph).items())

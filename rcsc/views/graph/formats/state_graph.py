@@ -105,7 +105,7 @@ def with_header(attributes: dict[str, str], edges: tuple[Edge, ...], states: tup
 
 
 def free(name: str, taken: Container[str]) -> str:
-    """The name, with as many `_` after it as make it one that is not taken."""
+    """Return the name, with as many `_` after it as make it one that is not taken."""
     while name in taken:
         name += "_"
     return name
