@@ -31,7 +31,7 @@ from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
 from rcsc.run.description import description
-from rcsc.run.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
+from rcsc.run.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted, WatchedNeighbour
 
 _TOGETHER = frozenset({RUNS, ENDING, RESTING})
 """Claims that are all of several others, which are watched one by one."""
@@ -101,20 +101,20 @@ def _kind(key: Key) -> str:
     return known.get(key[0], "")
 
 
-def _above(end: Above) -> Neighbour:
-    return Neighbour(
-        end.name, end.order, end.report, end.outside, end.done, end.failed, numbered=end.numbered
+def _above(end: Above) -> WatchedNeighbour:
+    return WatchedNeighbour(
+        end.name, end.order, end.report, end.outside, done=end.done, failed=end.failed, numbered=end.numbered
     )
 
 
-def _below(end: Below) -> Neighbour:
-    return Neighbour(
+def _below(end: Below) -> WatchedNeighbour:
+    return WatchedNeighbour(
         end.name,
         end.order,
         end.report,
         end.outside,
-        end.done,
-        end.failed,
+        done=end.done,
+        failed=end.failed,
         late=end.late or "",
         in_time=end.answers_in_time,
     )

@@ -13,7 +13,7 @@ from rcsc.run.campaign.summary import watched, watched_text
 from rcsc.run.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart
 from rcsc.run.episodes.loop import Loop
 from rcsc.run.episodes.proved.checks import WATCHED
-from rcsc.run.episodes.proved.claims import Claim, Claims, Neighbour, ProvedLevel, Trusted
+from rcsc.run.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted, WatchedNeighbour
 from rcsc.run.episodes.proved.watch import PROVED
 from rcsc.run.episodes.sampling import draw_on
 from rcsc.run.episodes.stand import Stand, stand
@@ -357,8 +357,8 @@ class TestFalseClaims:
     def test_that_an_order_waits_for_its_echo_but_where_it_is_late(self, tmp_path: Path) -> None:
         """What is ordered instead is late no more where the cycle ends."""
         its = stand(written(tmp_path, TIMELY))
-        above = Neighbour("user", "user", "to_user", True, "done", "failed")
-        below = Neighbour("a", "to_a", "from_a", True, "done", "failed")
+        above = WatchedNeighbour("user", "user", "to_user", True)
+        below = WatchedNeighbour("a", "to_a", "from_a", True)
         claim = Claim("lv", "WAITS", "", "to_a", "no other command replaces its order")
         silent = Episode(
             orders=(OrderSpec("lv", "sort"),), harms=(BufferFault("a.to_lv", "lost", 0, 60),), ticks=60

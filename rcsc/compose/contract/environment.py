@@ -6,7 +6,7 @@ order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_c
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from rcsc.lang.model import (
     Enum,
@@ -23,53 +23,7 @@ from rcsc.lang.model import (
     Variable,
 )
 from rcsc.run.description import BadDescription, Description
-
-NUMBER, COMMAND = "inc_command", "input_command"
-ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
-
-
-@dataclass(frozen=True, slots=True)
-class Neighbour:
-    """A level, or something outside the system, with which orders and reports are exchanged.
-
-    Attributes:
-        name: Its name.
-        order: The record of this level that carries orders; `report`, the one that carries reports on them.
-        outside: Whether it stands outside the levels.
-        done, failed: The statuses that answer a command.
-    """
-
-    name: str
-    order: str
-    report: str
-    outside: bool
-    done: str = field(default="done", kw_only=True)
-    failed: str = field(default="failed", kw_only=True)
-
-    @property
-    def number(self) -> str:
-        """The leaf with the number of the order."""
-        return f"{self.order}.{NUMBER}"
-
-    @property
-    def command(self) -> str:
-        """The leaf with the command that is ordered."""
-        return f"{self.order}.{COMMAND}"
-
-    @property
-    def echo(self) -> str:
-        """The leaf with the number that is reported about."""
-        return f"{self.report}.{ECHO}"
-
-    @property
-    def echoed(self) -> str:
-        """The leaf with the command that is reported about."""
-        return f"{self.report}.{ECHOED}"
-
-    @property
-    def status(self) -> str:
-        """The leaf with the reported status."""
-        return f"{self.report}.{STATUS}"
+from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Neighbour
 
 
 @dataclass(frozen=True, slots=True)

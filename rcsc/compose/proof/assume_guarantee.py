@@ -29,13 +29,13 @@ from rcsc.compose.contract.claims import (
     Verdict,
     worst,
 )
-from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_table
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.execution import Run
+from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER
 
 
 def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:

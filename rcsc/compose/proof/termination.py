@@ -31,15 +31,7 @@ Lines for which this is not shown are named in `endless`: they wait for what the
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rcsc.compose.contract.environment import (
-    ECHO,
-    ECHOED,
-    NUMBER,
-    STATUS,
-    Below,
-    Neighbour,
-    leaves_under,
-)
+from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import ANSWER, FLAG, SETTLES, command_stays
 from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, may
@@ -53,6 +45,7 @@ from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.keyed import sort
 from rcsc.proof.symbolic.values import Node
+from rcsc.run.orders.roles import ECHO, ECHOED, NUMBER, STATUS, Neighbour
 
 MOST_STEPS = 400
 

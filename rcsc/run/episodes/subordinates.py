@@ -11,10 +11,9 @@ from random import Random
 from rcsc.run.episodes.operator import between
 from rcsc.run.episodes.stand import Stand
 from rcsc.run.orders.numbered import Latest
-from rcsc.run.orders.roles import COMMAND, DONE, ECHO, FAILED, NUMBER, STATUS, field_of
+from rcsc.run.orders.roles import COMMAND, DONE, ECHO, ECHOED, FAILED, NUMBER, STATUS, field_of
 from rcsc.run.signature import Leaf, Value, Values
 
-ECHOED = "ref_command_echo"
 DELAYS = (0, 0, 1, 2, 8)
 """Ticks until an order is echoed, and from then until it ends."""
 FAILS = 0.25

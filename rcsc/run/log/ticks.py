@@ -13,12 +13,11 @@ from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import fault_of
+from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.signature import Leaf, Signature, Values
 
-NUMBER, COMMAND = "inc_command", "input_command"
 MOST_KNOWN = 64
 """Programs of which is kept where their records lie."""
-ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,17 +7,61 @@ names say it (Haynes et al. 1984, section 9): an order has `inc_command` and `in
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rcsc.run.description import Description
 from rcsc.run.signature import Leaf, Serves, Signature, Value
 
 NUMBER, COMMAND = "inc_command", "input_command"
-ECHO, STATUS = "inc_command_echo", "status_report"
-PROTOCOL = (NUMBER, COMMAND, ECHO, "ref_command_echo", STATUS)
+ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
+PROTOCOL = (NUMBER, COMMAND, ECHO, ECHOED, STATUS)
 """Fields that the protocol fills; all others of an order and a report are the user's."""
 DONE, FAILED = "done", "failed"
 """What members of the status mean, by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbour:
+    """A level, or something outside the system, with which orders and reports are exchanged.
+
+    Attributes:
+        name: Its name.
+        order: The record of this level that carries orders; `report`, the one that carries reports on them.
+        outside: Whether it stands outside the levels.
+        done, failed: The statuses that answer a command.
+    """
+
+    name: str
+    order: str
+    report: str
+    outside: bool
+    done: str = field(default=DONE, kw_only=True)
+    failed: str = field(default=FAILED, kw_only=True)
+
+    @property
+    def number(self) -> str:
+        """The leaf with the number of the order."""
+        return f"{self.order}.{NUMBER}"
+
+    @property
+    def command(self) -> str:
+        """The leaf with the command that is ordered."""
+        return f"{self.order}.{COMMAND}"
+
+    @property
+    def echo(self) -> str:
+        """The leaf with the number that is reported about."""
+        return f"{self.report}.{ECHO}"
+
+    @property
+    def echoed(self) -> str:
+        """The leaf with the command that is reported about."""
+        return f"{self.report}.{ECHOED}"
+
+    @property
+    def status(self) -> str:
+        """The leaf with the reported status."""
+        return f"{self.report}.{STATUS}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from functools import partial
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Value, pending
-from rcsc.run.episodes.proved.claims import Claim, Neighbour, ProvedLevel
+from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import EXTERN, FLAG, Now, Reader, told
 from rcsc.run.signature import FAULTS, STOPPED, Values
 
@@ -167,11 +167,11 @@ def _next_number(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     return check
 
 
-def _below(claim: Claim, level: ProvedLevel) -> Neighbour:
+def _below(claim: Claim, level: ProvedLevel) -> WatchedNeighbour:
     return next(one for one in level.below if one.order == claim.name)
 
 
-def _stays(above: Neighbour, reader: Reader) -> Callable[[Now], bool]:
+def _stays(above: WatchedNeighbour, reader: Reader) -> Callable[[Now], bool]:
     """Whether a level takes the same order as in the last cycle that took one."""
     number = reader.at(above.number)
     return lambda now: now.stood[number] == now.values[number]
@@ -290,7 +290,7 @@ def contract(record: str, reader: Reader, level: ProvedLevel) -> Check:
     return _fits(below, reader)
 
 
-def _same_order(above: Neighbour, reader: Reader) -> Check:
+def _same_order(above: WatchedNeighbour, reader: Reader) -> Check:
     stays, leaves = _stays(above, reader), [(name, reader.at(name)) for name in above.numbered]
 
     def check(now: Now) -> str:
@@ -304,7 +304,7 @@ def _same_order(above: Neighbour, reader: Reader) -> Check:
     return check
 
 
-def _fits(below: Neighbour, reader: Reader) -> Check:
+def _fits(below: WatchedNeighbour, reader: Reader) -> Check:
     number, command, echo, echoed = map(reader.at, (below.number, below.command, below.echo, below.echoed))
 
     def check(now: Now) -> str:

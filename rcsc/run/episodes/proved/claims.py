@@ -7,12 +7,10 @@ import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcsc.run.orders.roles import COMMAND, ECHO, NUMBER, STATUS
+from rcsc.run.orders.roles import Neighbour
 
 if TYPE_CHECKING:
     from rcsc.lang.model import Expr  # who plays other episodes knows no language
-
-ECHOED = "ref_command_echo"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,51 +55,18 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Neighbour:
-    """Somebody with whom a level exchanges orders and reports.
+class WatchedNeighbour(Neighbour):
+    """Somebody with whom a level exchanges orders and reports, as episodes watch it.
 
     Attributes:
-        order, report: The level's records.
-        outside: Whether it stands outside the levels.
         numbered: Leaves of an order that stay while its number does.
         late: The flag that an answer is late; empty where it is waited for without end.
         in_time: Whether a late answer counts as one.
     """
 
-    name: str
-    order: str
-    report: str
-    outside: bool
-    done: str
-    failed: str
     numbered: tuple[str, ...] = ()
     late: str = ""
     in_time: bool = False
-
-    @property
-    def number(self) -> str:
-        """The leaf with an order's number."""
-        return f"{self.order}.{NUMBER}"
-
-    @property
-    def command(self) -> str:
-        """The leaf with an order's command."""
-        return f"{self.order}.{COMMAND}"
-
-    @property
-    def echo(self) -> str:
-        """The leaf with the number that is reported about."""
-        return f"{self.report}.{ECHO}"
-
-    @property
-    def echoed(self) -> str:
-        """The leaf with the command that is reported about."""
-        return f"{self.report}.{ECHOED}"
-
-    @property
-    def status(self) -> str:
-        """The leaf with the reported status."""
-        return f"{self.report}.{STATUS}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +80,8 @@ class ProvedLevel:
 
     name: str
     proof: str
-    above: Neighbour | None
-    below: tuple[Neighbour, ...]
+    above: WatchedNeighbour | None
+    below: tuple[WatchedNeighbour, ...]
     claims: tuple[Claim, ...]
     filled: tuple[str, ...] = ()
 

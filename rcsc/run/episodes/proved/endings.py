@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from rcsc.lang.interpret import UNDEFINED, Fault, cycle
 from rcsc.lang.model import Value
-from rcsc.run.episodes.proved.claims import Claim, Neighbour, ProvedLevel
+from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import Now, Reader
 from rcsc.run.orders.roles import ECHO, NUMBER, STATUS
 from rcsc.run.signature import Leaf, Values
@@ -101,7 +101,7 @@ class Endings:
         self._steps.clear()
         self._places.clear()
 
-    def _step(self, above: Neighbour, now: Now) -> _Step:
+    def _step(self, above: WatchedNeighbour, now: Now) -> _Step:
         at, below = self.reader.at, self.level.below
         waits = not _ended(self.reader, above, now.values, now.values)
         return _Step(
@@ -120,7 +120,7 @@ class Endings:
     def _round(self, values: Values) -> Values:
         return tuple(values[at] for at in self._kept)
 
-    def _answered(self, below: Neighbour, now: Now) -> bool:
+    def _answered(self, below: WatchedNeighbour, now: Now) -> bool:
         at = self.reader.at
         echoed = now.values[at(below.echo)] == now.before[at(below.number)]
         if echoed and _ended(self.reader, below, now.before, now.values):
@@ -173,7 +173,7 @@ class Endings:
         return tuple(state[names[at].name] for at in self._kept) == self._steps[first].before
 
 
-def _ended(reader: Reader, end: Neighbour, ordered: Values, reported: Values) -> bool:
+def _ended(reader: Reader, end: WatchedNeighbour, ordered: Values, reported: Values) -> bool:
     """Whether a report ends its order: *done* or *failed*; the first command *done* alone."""
     leaf = reader.sign.leaves[reader.at(end.status)]
     status = leaf.shown(reported[reader.at(end.status)])
