@@ -91,7 +91,7 @@ def test_a_used_file_that_others_change_on_disk_is_seen_when_its_user_is_asked_f
     assert state(doc) == "proved"
     words = folder / "words.rcs"
     words.unlink() if text is None else words.write_text(text)
-    with pytest.raises(Refused, match="not in order"):
+    with pytest.raises(Refused, match="the text has errors"):
         bench.ask("proof.filter", file="t.rcs", version=doc["version"], table="t", condition="now = on")
     words.write_text(WORDS)
     assert state(bench.open("t.rcs")) == "proved"
