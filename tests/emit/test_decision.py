@@ -12,13 +12,13 @@ from rcsc.code.emit import decision as decisions
 from rcsc.code.emit.decision import Cut, decision, depth, ends
 from rcsc.code.emit.lower import lower
 from rcsc.code.testing.agree import NONE, SEVERAL, AgreementCount, line_number, run_lines
-from rcsc.code.testing.executors.symbols import symbols_of
-from rcsc.code.testing.matcher import Checked, MatcherCheck
+from rcsc.code.testing.matcher import Checked
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, ProvedProgram, Snapshot, key_bounds, seal_of_proof, value_of_key
 from tests.bench.executors import c_counts
 from tests.bench.made.families import Fault, box, linear
 from tests.emit.test_agreement import executors_of
+from tests.emit.test_mutants import check_of
 from tests.support.programs.stages import emitted, program_of
 
 FALLING = """
@@ -163,7 +163,7 @@ def test_a_long_ladder_is_given_up_early() -> None:
 
 
 def check(program: Program, files: dict[str, str]) -> Checked | tuple[str, ...]:
-    checked = MatcherCheck(program, symbols_of(program, files), program.tables[0]).of(files)
+    checked = check_of(program, files, program.tables[0]).of(files)
     assert not isinstance(checked, Absent)
     return checked
 

@@ -21,10 +21,11 @@ from rcsc.base.host.children import scratch
 from rcsc.base.host.files.read import MOST_OF_OURS, content
 from rcsc.base.host.tools import Absent, c_compiler, run_command, write_c
 from rcsc.code.testing.esbmc import EsbmcAnswer, prove_function, too_large
+from rcsc.code.testing.executors.edges import relational_tests
 from rcsc.code.testing.executors.externs import STAND_INS
 from rcsc.code.testing.executors.native import COMPILE_S, Native
 from rcsc.code.testing.executors.shim import shim_c
-from rcsc.code.testing.executors.symbols import Symbols
+from rcsc.code.testing.executors.symbols import Symbols, source_of
 from rcsc.code.testing.executors.targets import ComparedFunction, targets
 from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.lang.model import Program, Snapshot
@@ -232,11 +233,6 @@ def _mutants(text: str, lines: int, first: int, last: int) -> Iterator[CodeMutan
             yield CodeMutant(change, function, text, token.start, token.text, new)
 
 
-def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
-    """The emitted C file."""
-    return next(text for path, text in files.items() if Path(path).name == symbols.source)
-
-
 @dataclass(slots=True)
 class Judge:
     """Decides on mutants of one program's C; the shim is compiled once.
@@ -292,15 +288,15 @@ class Judge:
         return next(each for each in (Noticed.MATCHER, Noticed.UNDECIDED, Noticed.EQUIVALENT) if each in said)
 
     def checked(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
-        """What the check of one matcher says; undecided where it is not complete."""
+        """What the check of one matcher says; undecided where a condition over several variables may hide a difference."""
         number, table = target.number, self.program.tables[target.number]
         if number not in self.checks:
             known = self.known.get(table.name, ())
             self.checks[number] = MatcherCheck(self.program, self.symbols, table, known)
         if number not in self.said:
             checked = self.checks[number].of(files)
-            complete = isinstance(checked, Checked) and not checked.truths and not checked.unmatched
-            equal = Noticed.EQUIVALENT if complete else Noticed.UNDECIDED
+            tried = isinstance(checked, Checked) and not checked.unmatched and not relational_tests(table)
+            equal = Noticed.EQUIVALENT if tried else Noticed.UNDECIDED
             self.said[number] = Noticed.MATCHER if isinstance(checked, tuple) else equal
         return self.said[number]
 

@@ -23,8 +23,7 @@ class TableFigures:
         shown: Conditions shown to decide their line on their own.
         impossible: Conditions for which that is shown impossible within ranges and assumptions.
         cells: Cells of the matcher compared with the table; 0 where it was not done.
-        truths: Conditions over several variables: what no input tells of their cells is not compared.
-        unmatched: Lines whose cells were not compared, as no input was found for them.
+        unmatched: Lines that no input was found for: their classes of values were not tried.
         mutants: Mutants of the table by who caught them.
         cortex: The emulated target's answer, or why it was not asked.
     """
@@ -37,7 +36,6 @@ class TableFigures:
     impossible: int = 0
     cells: int = 0
     unmatched: tuple[str, ...] = ()
-    truths: int = 0
     mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
     cortex: CortexRun | str = ""
 
@@ -116,10 +114,8 @@ def _table_text(table: TableFigures) -> Iterator[str]:
         f"{table.impossible} impossible, {open_} not found"
     )
     if table.cells:
-        several = f"as far as inputs tell: {counted(table.truths, 'condition')} over several variables"
-        left = [f"no input found for {', '.join(table.unmatched)}"] if table.unmatched else []
-        left += [several] if table.truths else []
-        yield f"    matcher = table: {counted(table.cells, 'cell')} compared, {', '.join(left) or 'complete'}"
+        how = f"no input found for {', '.join(table.unmatched)}" if table.unmatched else "complete"
+        yield f"    matcher = table: {counted(table.cells, 'cell')} compared, {how}"
     if isinstance(table.cortex, CortexRun):
         run = table.cortex
         whole = "all " if run.complete else ""

@@ -1,45 +1,60 @@
-"""The emitted C matcher is its table: a check a group of variables at a time, for any size.
+"""The emitted C matcher is its table: every bit of its masks, and the line that it finds for every value of each variable.
 
-In: a program, its emitted C, one of its tables. Out: how many cells were compared, or an input on which the C gives another line.
+In: a program, its emitted C, one of its tables, inputs that match its lines. Out: how many cells were compared, or where the C differs.
 
-Why this is complete, where each condition looks at one variable. The matcher looks up one mask for each group of leaves and joins
-them by AND; bit k stands for line k, and the line follows from the joined mask. From an input that matches line k alone, let the
-leaves of one group take every combination of their classes, and the other leaves stay. Then bit k of each other mask is set, so that
-the C gives line k exactly where bit k of this group's mask is set and no other line matches. So each bit of each mask decides an
-answer, and every answer is compared with that of a second C, which reads the table line by line. It takes a run for each line and
-each value, and not for each combination of all values: three leaves of a thousand values and ten lines take thirty thousand runs,
-not 10^9.
+The matcher looks up one mask for each group of leaves and conditions, and joins them by AND; bit k stands for line k, and the line
+follows from the joined mask. It is compared in two parts.
+
+The masks: `mask_probe` copies them out of the emitted file, and each is compared with the one that the table gives: for each
+combination of classes of the leaves and truths of the conditions, also those that no input has, the lines that do not exclude it.
+
+The classes: the compiled function is asked, as it is. From an input that matches line k alone, let the leaves of one group take every
+combination of their classes, and the other leaves stay. Then bit k of each other mask is set, so that the C gives line k exactly
+where bit k of this group's mask is set and no other line matches. Every answer is compared with that of a second C, which reads the
+table line by line. It takes a run for each line and each value, and not for each combination of all values: three leaves of a
+thousand values and ten lines take thirty thousand runs, not 10^9.
 
 Each leaf also takes its values one by one: all of them where they are few, else the ends of its range and every bound of the table's
 own cells, with both neighbours; between those as many constants as there are bounds cannot make another turn.
 
-The compiled function is asked, as it is; nothing reads its text or the masks that it was made of. Trusted for this: that it joins
-one look-up a group, the groups being those of the plan. Conditions over several variables hold or not as the values that are
-asked for have it, so that a table that has some is compared as far as inputs tell: the rest is ESBMC's part.
+Trusted for this: that the C joins one look-up a group, the groups being those of the plan. Whether the C finds the truth of a
+condition over several variables is not asked for all inputs: that is a matter of expressions, which agreement and ESBMC compare.
 What it costs: lines times the sizes of the variables, in all.
 """
 
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, islice
-from math import prod
-from random import Random
 
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files.read import MOST_OF_OURS, content
 from rcsc.base.host.tools import Absent, c_compiler, run_command, write_c
+from rcsc.code.emit.c.matching.masks import classes_of, leaves_of, mask_probe
 from rcsc.code.emit.lower import lower_by_force
-from rcsc.code.emit.plan import Coded, Cuts, Direct, Group, Truth, first_value
-from rcsc.code.testing.executors.edges import companions, leaf_edges, may_be_matched, relational_tests
+from rcsc.code.emit.plan import (
+    WORD,
+    Coded,
+    Cuts,
+    Direct,
+    Group,
+    Index,
+    Plan,
+    PlanTable,
+    Probe,
+    Truth,
+    first_value,
+    joined,
+)
+from rcsc.code.testing.executors.edges import may_be_matched, relational_tests
 from rcsc.code.testing.executors.native import COMPILE_S, FLAGS, of_word, to_word
 from rcsc.code.testing.executors.reference_file import reference_c
 from rcsc.code.testing.executors.shim import WORDS, set_leaves_c
-from rcsc.code.testing.executors.symbols import Symbols
-from rcsc.lang.interpret import holds, matching_lines
+from rcsc.code.testing.executors.symbols import Symbols, source_of
+from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import boxes_of
+from rcsc.lang.interval_sets import holds as contains
 from rcsc.lang.model import (
-    Line,
     Program,
     Real,
     Snapshot,
@@ -53,8 +68,8 @@ from rcsc.lang.model import (
 RUN_S = 300.0
 EVERY_KEY = 4096
 """Keys of a leaf up to which it takes every one."""
-MOST_DRAWN = 400
-"""Inputs drawn for a line until one matches it."""
+MOST_TOLD = 3
+"""Wrong masks that are told."""
 STARTS = 8
 """Inputs of a line that are gone on from, where a condition over several variables may hold or not in each."""
 PROBE = """
@@ -74,11 +89,13 @@ static int differs(int64_t *row, int64_t axes, const int64_t *leaf, const int64_
   return 0;
 }}
 int main(int argc, char **argv) {{
-  static int64_t row[{leaves} + 2];
+  static int64_t row[{leaves} + 2]; static uint64_t masks[{words} + 1];
   FILE *in = fopen(argv[1], "rb"), *to = fopen(argv[2], "wb");
   if (argc != 3 || !in || !to || fseek(in, 0, SEEK_END)) {{ return 2; }}
   const size_t size = (size_t)ftell(in); int64_t *all = malloc(size); rewind(in);
   if (!all || fread(all, 1, size, in) != size) {{ return 3; }}
+  probe_masks(masks);
+  if (fwrite(masks, sizeof *masks, {words}, to) != {words}) {{ return 4; }}
   const int64_t *rows = all + 1, *sets = rows + all[0] * {leaves};
   for (int64_t start = 0; start < all[0]; start++) {{
     for (const int64_t *p = sets; p < all + size / sizeof *all;) {{
@@ -88,7 +105,7 @@ int main(int argc, char **argv) {{
       for (p = values; length < values; length++) {{ p += *length; }}
     }}
   }}
-  return 0;
+  return fclose(to) != 0;
 }}
 """
 
@@ -99,28 +116,11 @@ class Checked:
 
     Attributes:
         cells: Bits of masks, a line and a combination of classes each.
-        truths: Conditions over several variables, which hold or not as the inputs have it.
-        unmatched: Lines that no input was found for; their bits are not compared.
+        unmatched: Lines that no input is known of: the classes that they alone look at are not tried.
     """
 
     cells: int
-    truths: int
     unmatched: tuple[str, ...]
-
-
-def _probe_c(program: Program, symbols: Symbols, table: Table) -> str:
-    """C that asks both functions for the line of many inputs; see `MatcherCheck.axes` for what it reads."""
-    number = program.tables.index(table)
-    probe = PROBE.format(
-        struct=symbols.struct,
-        leaves=len(program.variables),
-        function=symbols.lines[table.name],
-        reference=f"ref_t{number}_line",
-        defined=f"ref_t{number}_safe(&s)" if relational_tests(table) else "1",
-    )
-    head = [f"#include <{name}.h>" for name in ("stdio", "stdlib", "string")]
-    head += [f'#include "{symbols.header}"', reference_c(program, symbols), WORDS]
-    return "\n".join([*head, *set_leaves_c(program, symbols), probe])
 
 
 @dataclass(slots=True)
@@ -131,32 +131,31 @@ class MatcherCheck:
         program: The program.
         symbols: Names in its emitted C.
         table: One of its tables.
-        known: Inputs that match lines of it; more are drawn.
+        known: Inputs that match lines of it.
     """
 
     program: Program
     symbols: Symbols
     table: Table
-    known: Sequence[Snapshot] = ()
-    edges: dict[str, tuple[int, ...]] = field(init=False)
-    near: dict[str, tuple[str, ...]] = field(init=False)
+    known: Sequence[Snapshot]
+    plan: Plan = field(init=False)
+    planned: PlanTable = field(init=False)
     _asked: bytes = field(init=False)
+    _masks: tuple[tuple[Group, tuple[int, ...]], ...] = field(init=False)
     _told: Checked = field(init=False)
 
     def __post_init__(self) -> None:
-        """Finds inputs of each line, and what is asked from there."""
-        self.edges, self.near = leaf_edges(self.program), companions(self.program)
-        lines, plan = self.table.lines, lower_by_force(self.program)
-        starts = [self.starts(at, line) for at, line in enumerate(lines)]
-        groups = next(one for one in plan.tables if one.table.name == self.table.name).matcher.groups
-        asked = array("q", [sum(map(len, starts))])
-        for words in (*chain(*starts), *(axes for group in groups for axes in self.axes(group))):
+        """Finds inputs of each line, what is asked from there, and the masks that the table gives."""
+        self.plan = lower_by_force(self.program)
+        self.planned = next(one for one in self.plan.tables if one.table.name == self.table.name)
+        groups, starts = self.planned.matcher.groups, self.starts()
+        asked = array("q", [sum(map(len, starts.values()))])
+        for words in (*chain(*starts.values()), *(axes for group in groups for axes in self.axes(group))):
             asked += words
         self._asked = asked.tobytes()
-        cells = sum(prod(len(probe.masks) for probe in group) for group in groups)
-        unmatched = tuple(str(line.name) for line, some in zip(lines, starts, strict=True) if not some)
-        truths = len(relational_tests(self.table))
-        self._told = Checked(cells * (len(lines) - len(unmatched)), truths, unmatched)
+        self._masks = tuple((group, self.masks(group)) for group in groups)
+        cells = sum(len(masks) for _, masks in self._masks) * len(self.table.lines)
+        self._told = Checked(cells, tuple(name for name, some in starts.items() if not some))
 
     def of(self, files: Mapping[str, str]) -> Checked | tuple[str, ...] | Absent:
         """Compares the matcher in these files, text by path, with the table."""
@@ -165,7 +164,7 @@ class MatcherCheck:
             return compiler
         with scratch("matcher") as place:
             others = write_c(files, place)
-            (place / "probe.c").write_text(_probe_c(self.program, self.symbols, self.table), "utf-8")
+            (place / "probe.c").write_text(self.probe_c(source_of(self.symbols, files)), "utf-8")
             (place / "in.bin").write_bytes(self._asked)
             compiled = run_command([compiler, *FLAGS, "-o", "probe", "probe.c", *others], place, COMPILE_S)
             if compiled.status != 0:
@@ -173,8 +172,59 @@ class MatcherCheck:
             ran = run_command([str(place / "probe"), "in.bin", "out.bin"], place, RUN_S)
             if ran.status != 0:
                 return ("the C stops on some input, or does not end",)
-            differing = array("q", content(place / "out.bin", MOST_OF_OURS))
-        return (self.told(differing),) if differing else self._told
+            found = content(place / "out.bin", MOST_OF_OURS)
+        masks, differing = array("Q", found[: 8 * self.words]), array("q", found[8 * self.words :])
+        differences = [*islice(self.wrong(masks), MOST_TOLD), *([self.told(differing)] if differing else [])]
+        return tuple(differences) or self._told
+
+    @property
+    def words(self) -> int:
+        """Words of all masks of the table."""
+        return sum(len(masks) for _, masks in self._masks) * self.planned.matcher.words
+
+    def probe_c(self, source: str) -> str:
+        """C that copies the masks of an emitted file and asks both functions for the line of many inputs; see `axes`."""
+        number = self.program.tables.index(self.table)
+        probe = PROBE.format(
+            struct=self.symbols.struct,
+            leaves=len(self.program.variables),
+            words=self.words,
+            function=self.symbols.lines[self.table.name],
+            reference=f"ref_t{number}_line",
+            defined=f"ref_t{number}_safe(&s)" if relational_tests(self.table) else "1",
+        )
+        head = [f"#include <{name}.h>" for name in ("stdio", "stdlib", "string")]
+        head += [f'#include "{self.symbols.header}"', "#define RCSC_CONST_SECTION"]
+        head += [reference_c(self.program, self.symbols), WORDS, *set_leaves_c(self.program, self.symbols)]
+        return "\n".join([*head, mask_probe(self.plan, self.planned, source), probe])
+
+    # --- masks ---
+
+    def masks(self, group: Group) -> tuple[int, ...]:
+        """The masks of a group that the table gives, by class."""
+        return joined(tuple(Probe(probe.index, self.left(probe.index)) for probe in group))
+
+    def left(self, index: Index) -> tuple[int, ...]:
+        """For each class of a leaf, or each truth of a condition, the lines that do not exclude it."""
+        lines = self.table.lines
+        if isinstance(index, Truth):
+            free = [
+                all(t is None or t.condition is not index.condition for t in line.tests) for line in lines
+            ]
+            return _mask(free), _mask(True for _ in lines)
+        boxes = [boxes_of(line.tests).get(index.leaf) for line in lines]
+        return tuple(_mask(box is None or contains(box, key) for box in boxes) for key in _firsts(index))
+
+    def wrong(self, words: Iterable[int]) -> Iterator[str]:
+        """Each mask of the C that is not the table's, in words."""
+        words, size = iter(words), self.planned.matcher.words
+        for group, masks in self._masks:
+            for at, mask in enumerate(masks):
+                found = sum(next(words) << WORD * place for place in range(size))
+                if found != mask:
+                    yield f"for {leaves_of(group)}: {classes_of(group)[at]} the C has the mask {found:#x}, the table {mask:#x}"
+
+    # --- lines ---
 
     def told(self, row: Sequence[int]) -> str:
         """An input on which the C gives another line than the table, in words."""
@@ -186,50 +236,16 @@ class MatcherCheck:
         where = ", ".join(f"{name} = {values[name]}" for name in self.table.variables)
         return f"at {where} the C gives line {got}, the table {right}"
 
-    # --- where a line is gone on from ---
-
-    def starts(self, at: int, line: Line) -> list["array[int]"]:
-        """Inputs that match this line alone, as words."""
+    def starts(self) -> dict[str, list["array[int]"]]:
+        """For each line the inputs that match it alone, as words; not more than are asked about."""
         most = STARTS if relational_tests(self.table) else 1
-        random = Random(at)  # noqa: S311  # repeatable
-        drawn = (self.drawn(line, random, calm=number % 2 == 0) for number in range(MOST_DRAWN))
-        alone = (one for one in chain(self.known, drawn) if self.matches_alone(line, one))
-        return [
-            array("q", [to_word(v.type, one[v.name]) for v in self.program.variables])
-            for one in islice(alone, most)
-        ]
-
-    def matches_alone(self, line: Line, snapshot: Snapshot) -> bool:
-        """Whether the line matches, and no other; false where that is not defined."""
-        return (
-            may_be_matched(self.program, self.table, snapshot)
-            and all(test is None or holds(test, snapshot) for test in line.tests)
-            and matching_lines(self.table, snapshot) == [line.name]
-        )
-
-    def drawn(self, line: Line, random: Random, *, calm: bool) -> Snapshot:
-        """A state inside the line's cells of one variable each.
-
-        Where it is calm, the others keep their initial values; else they are on edges, half of them beside what they are
-        compared with.
-        """
-        boxes = boxes_of(line.tests)
-        keys: dict[str, int] = {}
-        for variable in self.program.variables:
-            if calm and variable.name not in boxes:
-                keys[variable.name] = key_of(variable.type, variable.initial)
-                continue
-            box = boxes.get(variable.name, (key_bounds(variable.type),))
-            edges = [key for key in self.edges[variable.name] if any(a <= key <= b for a, b in box)]
-            near = [keys[name] for name in self.near.get(variable.name, ()) if name in keys]
-            key = random.choice(edges) if edges else random.choice(box or (key_bounds(variable.type),))[0]
-            if near and random.getrandbits(1):
-                beside = random.choice(near) + random.choice((-1, 0, 1))
-                key = beside if any(a <= beside <= b for a, b in box) else key
-            keys[variable.name] = key
-        return {v.name: value_of_key(v.type, keys[v.name]) for v in self.program.variables}
-
-    # --- what is asked from there ---
+        starts: dict[str, list[array[int]]] = {str(line.name): [] for line in self.table.lines}
+        for one in self.known:
+            names = matching_lines(self.table, one) if may_be_matched(self.program, self.table, one) else []
+            if len(names) == 1 and len(starts[names[0]]) < most:
+                words = (to_word(v.type, one[v.name]) for v in self.program.variables)
+                starts[names[0]].append(array("q", words))
+        return starts
 
     def axes(self, group: Group) -> Iterator["array[int]"]:
         """The leaves of a group with the first keys of their classes, and each of them with all of its keys.
@@ -258,6 +274,10 @@ class MatcherCheck:
         ends = {end for box in boxes for ends in box for end in ends}
         near = {end + step for end in ends for step in (-1, 0, 1)} | {low, high}
         return sorted(key for key in near if low <= key <= high)
+
+
+def _mask(bits: Iterable[bool]) -> int:
+    return sum(1 << at for at, bit in enumerate(bits) if bit)
 
 
 def _firsts(index: Direct | Coded | Cuts) -> list[int]:

@@ -189,7 +189,7 @@ class Suite:
         self.diagnostics.append(Diagnostic(Code.MATCHER_DIFFERS, message, place, notes=tuple(notes)))
 
     def matcher(self, table: Table) -> Checked | None:
-        """The complete check of the matcher, a group of variables at a time."""
+        """Compare the masks of the C with the table, and the lines that the C finds."""
         self.options.progress(f"comparing the masks of table {table.name}")
         checked = MatcherCheck(self.program, self.symbols, table, self.known[table.name]).of(self.files)
         if isinstance(checked, tuple):
@@ -277,7 +277,6 @@ class Suite:
             sum(1 for u in vectors.unshown if u.condition and u.reason != "not found"),
             checked.cells if checked else 0,
             checked.unmatched if checked else (),
-            checked.truths if checked else 0,
             self.mutants(table),
             self.cortex(number, table),
         )

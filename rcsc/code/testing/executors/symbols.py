@@ -5,6 +5,7 @@ In: the text of `<program>.json`. Out: names of files, functions and leaves, in 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from rcsc.base.host.files.read import json_of
@@ -126,6 +127,11 @@ def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
         if [leaf["name"] for leaf in document["leaves"]] == names:
             return _symbols(document)
     raise KeyError(program.name)
+
+
+def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
+    """Return the text of the emitted C file."""
+    return next(text for path, text in files.items() if Path(path).name == symbols.source)
 
 
 def _symbols(document: Mapping[str, Any]) -> Symbols:

@@ -3,6 +3,7 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import groupby, product
+from math import prod
 from operator import itemgetter
 from typing import assert_never
 
@@ -16,11 +17,13 @@ from rcsc.code.emit.code_tree import (
     Stmt,
 )
 from rcsc.code.emit.identifiers import comment
-from rcsc.code.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, PlanTable, Truth, joined
+from rcsc.code.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, joined
 from rcsc.lang.model import spell, value_of_key
 
 MOST_TOLD = 32
 """Masks in a table up to which each stands in a line of its own, with its class."""
+OPENS, ENDS = "RCSC_CONST_SECTION static const struct {", "\n    };"
+"""The first line of a table's object of masks, and the end of its last one: no other object is a struct."""
 
 
 def meaning(table: PlanTable) -> str:
@@ -40,7 +43,7 @@ def mask_tables(table: PlanTable) -> Iterator[Stmt]:
     words = "" if matcher.words <= 1 else f"[{matcher.words}]"
     masks = [joined(group) for group in matcher.groups]
     members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
-    yield Frame(("RCSC_CONST_SECTION static const struct {",), tuple(members))
+    yield Frame((OPENS,), tuple(members))
     rows = (
         Frame(
             (f"{{ /* {comment(f'{table.source}: {leaves_of(group)}')} */",),
@@ -50,6 +53,29 @@ def mask_tables(table: PlanTable) -> Iterator[Stmt]:
         for group, entries in zip(matcher.groups, masks, strict=True)
     )
     yield Frame(("} t = {",), tuple(rows), "};")
+
+
+def mask_probe(plan: Plan, table: PlanTable, source: str) -> str:
+    """Return C for tests alone: `probe_masks(out)` copies each word of a table's masks out of an emitted file.
+
+    The object of masks is taken as it stands in the file, so that a wrong word of it is seen. Words follow each other as the
+    groups of the matcher do, in each group by class in mixed radix, in each mask from the lowest.
+
+    Args:
+        plan: The plan that the file was made of.
+        table: One of its tables.
+        source: The emitted C file.
+    """
+    groups = table.matcher.groups
+    with_masks = [one.table.name for one in plan.tables if one.matcher.groups]
+    objects = [part.partition(ENDS)[0] for part in source.split(OPENS)[1:]]
+    body = [f"{OPENS}{objects[with_masks.index(table.table.name)]}{ENDS}"] if groups else []
+    words = table.matcher.words
+    place = "[n]" if words <= 1 else f"[n / {words}u][n % {words}u]"
+    for at, group in enumerate(groups):
+        count = prod(probe.index.count for probe in group) * words
+        body.append(f"for (uint32_t n = 0; n < {count}u; n++) {{ *out = t.t{at}{place}; out++; }}")
+    return "\n".join(["static void probe_masks(uint64_t *out)", "{", *body, "(void)out;", "}"])
 
 
 def leaves_of(group: Group) -> str:
@@ -63,7 +89,7 @@ def _rows(
     group: Group, entries: tuple[int, ...], lines: Sequence[str], size: tuple[int, int]
 ) -> Iterator[Line]:
     """Yield masks, or the words of each, from the lowest: each in a line with its class and its lines, or each run of equal ones."""
-    (words, bits), classes = size, _classes(group)
+    (words, bits), classes = size, classes_of(group)
     runs = [[at for at, _ in run] for _, run in groupby(enumerate(entries), key=itemgetter(1))]
     if len(entries) <= MOST_TOLD:
         runs = [[at] for at, _ in enumerate(entries)]
@@ -105,7 +131,7 @@ def _left(mask: int, lines: Sequence[str]) -> str:
     return f"line{'s' if len(left) > 1 else ''} {', '.join(told)}"
 
 
-def _classes(group: Group) -> list[str]:
+def classes_of(group: Group) -> list[str]:
     """Describe each combination of classes, the last leaf's fastest."""
     return [", ".join(words) for words in product(*(_class_words(probe.index) for probe in group))]
 
