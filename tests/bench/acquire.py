@@ -11,7 +11,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from rcsc.base.host.tools import BuildFailed, run_command
-from rcsc.views.evidence.processors.boards import BOARDS, Board, harness, link, run_image
+from rcsc.code.testing.boards import BOARDS, Board, harness, link, run_image
 
 REPO = Path(__file__).parents[2]
 CASES = 3000

@@ -10,13 +10,13 @@ import pytest
 
 from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower_by_force
+from rcsc.code.testing import boards
+from rcsc.code.testing.boards import BOARDS, Board
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.views.evidence import resources
-from rcsc.views.evidence.processors import boards
 from rcsc.views.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
-from rcsc.views.evidence.processors.boards import BOARDS, Board
 from rcsc.views.evidence.resources import Need, measure
 from tests.evidence.subjects import EVERYTHING, subject_of
 

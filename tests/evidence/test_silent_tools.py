@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from rcsc.base.host.tools import BuildFailed
+from rcsc.code.testing.boards import BOARDS
 from rcsc.views.evidence import analysers, coverage, llvm, resources, runtime
 from rcsc.views.evidence.kind import Evidence
 from rcsc.views.evidence.misra import compliance, cppcheck
-from rcsc.views.evidence.processors.boards import BOARDS
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 WAYS = {

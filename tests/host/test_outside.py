@@ -849,10 +849,10 @@ def test_a_field_is_matched_to_its_end() -> None:
 
 SCRATCH = (
     "rcsc/compose/counterexample/rerun.py", "rcsc/desk/shell/reload/sources.py", "rcsc/run/executors.py",
-    "rcsc/views/diff/revision.py", "rcsc/code/testing/executors/native.py", "rcsc/code/testing/cortex.py", "rcsc/code/testing/esbmc.py",
+    "rcsc/views/diff/revision.py", "rcsc/code/testing/executors/native.py", "rcsc/code/testing/esbmc.py",
     "rcsc/code/testing/matcher.py", "rcsc/base/host/tools.py", "rcsc/code/testing/code_mutants.py", "rcsc/run/orders/together.py",
     "rcsc/run/link/beside.py", "rcsc/views/evidence/analysers.py", "rcsc/views/evidence/llvm.py", "rcsc/views/evidence/runtime.py",
-    "rcsc/views/evidence/processors/boards.py",
+    "rcsc/code/testing/boards.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""
 STREAMS = (

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.code.testing.cortex import FLAGS, LINK, LINKER, MACHINE, STARTUP
+from rcsc.code.testing.boards import BOARDS
 
 GUIDE = Path(__file__).parents[2] / "tables/README.md"
 STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wpedantic -Werror".split()
@@ -82,20 +82,24 @@ def test_as_one_unit_and_from_cpp(cc: str, robot: Path) -> None:
     sh(robot, f"{cc} -xc++ -std=c++17 -Wall -Wextra -Werror -Igenerated/c -fsyntax-only use.cpp")
 
 
+START = """extern void _start(void);
+__attribute__((section(".vectors"), used)) const void *const vectors[2] = {(const void *)0x20400000, (const void *)_start};
+"""
+"""The first two words of a Cortex-M's memory; the rest is newlib's."""
+
+
 @pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
 def test_on_a_cortex_m(robot: Path) -> None:
     """With the same warnings; the emulator runs it to its end, with no other memory than the state."""
-    (robot / "rcsc.ld").write_text(LINKER)
-    (robot / "start.c").write_text(
-        f"#include <stdint.h>\n#include <stdlib.h>\n#include <string.h>\n{STARTUP}"
-    )
+    board = next(board for board in BOARDS if board.name == "Cortex-M3")
+    (robot / "start.c").write_text(START)
     (robot / "unit.c").write_text(
         "".join(f'#include "{name}.c"\n' for name in ("drive", "supervisor", "dock"))
     )
-    arm = [flag for flag in FLAGS if flag not in {"-w", "-std=gnu11"}]
-    units = f"arm-none-eabi-gcc {' '.join([*STRICT, *arm])} -Igenerated/c -c unit.c main.c"
-    link = f"arm-none-eabi-gcc -w {' '.join([*arm, *LINK])} -o robot.elf unit.o main.o start.c"
-    assert sh(robot, f"{units}\n{link}\nqemu-system-arm {' '.join(MACHINE)} -kernel robot.elf") == PRINTED
+    arm = f"{' '.join(board.compiler)} -O2 -ffp-contract=off --specs=rdimon.specs"
+    places = "-Wl,--section-start=.vectors=0,-Tdata=0x20000000,--no-warn-rwx-segments"
+    built = f"{arm} {' '.join(STRICT)} -Igenerated/c -c unit.c main.c\n{arm} {places} -o robot.elf unit.o main.o start.c"
+    assert sh(robot, f"{built}\n{' '.join(board.emulator)} -kernel robot.elf") == PRINTED
     used = set(re.findall(r"U (\w+)", sh(robot, "arm-none-eabi-nm unit.o")))
     assert used <= {"memcpy", "memset", "__aeabi_uldivmod"}
 

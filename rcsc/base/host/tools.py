@@ -83,15 +83,3 @@ def esbmc() -> str | Absent:
     if digest != ESBMC_SHA256:
         return Absent(f"ESBMC's SHA-256 is {digest[:16]}..., not the pinned one")
     return str(binary)
-
-
-@cache
-def cortex_tools() -> tuple[str, str] | Absent:
-    """Return the Cortex-M cross compiler and the emulator."""
-    compiler, emulator = shutil.which("arm-none-eabi-gcc"), shutil.which("qemu-system-arm")
-    if compiler is None or emulator is None:
-        missing = [
-            n for n, p in (("arm-none-eabi-gcc", compiler), ("qemu-system-arm", emulator)) if p is None
-        ]
-        return Absent(f"not installed: {', '.join(missing)}")
-    return compiler, emulator

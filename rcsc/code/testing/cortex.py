@@ -1,10 +1,7 @@
 """The emitted C on an emulated Cortex-M3: every input of a table, line and step, against the reference.
 
 In: a program, its symbols, its emitted C. Out: how many inputs were run and how many
-differed. The image is the emitted C, the reference C and a start-up of a few lines, linked with newlib;
-QEMU's board mps2-an385 runs it, and semihosting brings the counts back.
-
-Source: notes of the project, formal.md 4.3.
+differed. The image is the emitted C and the reference C; `boards` builds and runs it.
 """
 
 import re
@@ -13,7 +10,8 @@ from dataclasses import dataclass
 from math import prod
 
 from rcsc.base.host.children import scratch
-from rcsc.base.host.tools import Absent, BuildFailed, cortex_tools, run_command, write_c
+from rcsc.base.host.tools import Absent, BuildFailed
+from rcsc.code.testing.boards import BOARDS, harness, run_image
 from rcsc.code.testing.executors.edges import leaf_edges
 from rcsc.code.testing.executors.externs import SCRIPTS, externs
 from rcsc.code.testing.executors.reference import constant
@@ -22,49 +20,14 @@ from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.model import Program, Real, Table, Variable, key_bounds, value_of_key
 
 MOST_INPUTS = 1 << 20
-TIMEOUT_S = 120.0
-MACHINE = (
-    "-M",
-    "mps2-an385",
-    "-nographic",
-    "-semihosting-config",
-    "enable=on,target=native",
-    "-monitor",
-    "none",
-)
-FLAGS = ("-std=gnu11", "-O2", "-w", "-mcpu=cortex-m3", "-mthumb", "-ffp-contract=off", "--specs=rdimon.specs")
-LINK = ("-nostartfiles", "-Wl,-T,rcsc.ld", "-Wl,--no-warn-rwx-segments")
-RESULT = re.compile(r"rcsc (\d+) inputs, (\d+) lines differ, (\d+) steps, (\d+) steps differ")
-
-LINKER = """
-MEMORY { FLASH (rx) : ORIGIN = 0x00000000, LENGTH = 4M
-         RAM (rwx) : ORIGIN = 0x20000000, LENGTH = 4M }
-ENTRY(reset)
-SECTIONS {
-  .text : { KEEP(*(.vectors)) *(.text*) *(.rodata*) . = ALIGN(8); } > FLASH
-  .ARM.exidx : { __exidx_start = .; *(.ARM.exidx*) __exidx_end = .; } > FLASH
-  .data : { data_start = .; *(.data*) . = ALIGN(8); data_end = .; } > RAM AT > FLASH
-  data_load = LOADADDR(.data);
-  .bss : { __bss_start__ = .; *(.bss*) *(COMMON) . = ALIGN(8); __bss_end__ = .; end = .; } > RAM
+BOARD = next(board for board in BOARDS if board.name == "Cortex-M3")
+COUNTS = {
+    "inputs": " inputs, ",
+    "lines": " lines differ, ",
+    "steps": " steps, ",
+    "differ": " steps differ\\n",
 }
-"""
-
-STARTUP = """
-extern uint32_t data_start, data_end, data_load, __bss_start__, __bss_end__;
-extern void initialise_monitor_handles(void);
-int main(void);
-void _init(void) {} void _fini(void) {}
-static void fault_handler(void) { exit(9); }
-void reset(void) {
-  memcpy(&data_start, &data_load, (size_t)((char *)&data_end - (char *)&data_start));
-  memset(&__bss_start__, 0, (size_t)((char *)&__bss_end__ - (char *)&__bss_start__));
-  initialise_monitor_handles();
-  exit(main());
-}
-__attribute__((section(".vectors"), used)) static const void *const vectors[8] = {
-  (const void *)0x20400000, (const void *)reset, (const void *)fault_handler, (const void *)fault_handler,
-  (const void *)fault_handler, (const void *)fault_handler, (const void *)fault_handler, 0};
-"""
+RESULT = re.compile(r"(\d+) inputs, (\d+) lines differ, (\d+) steps, (\d+) steps differ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,21 +102,10 @@ def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
     table = program.tables[number]
     struct = symbols.struct
     used, _ = choices(program, table, most)
-    parts = [
-        "#include <stdio.h>",
-        "#include <stdlib.h>",
-        "#include <string.h>",
-        f'#include "{symbols.header}"',
-    ]
-    parts += [
-        reference_c(program, symbols),
-        STARTUP,
-        "extern uint32_t rcsc_script;",
-        *leaf_values(program, symbols),
-        *_same(program, symbols),
-    ]
+    parts = [harness(), f'#include "{symbols.header}"', reference_c(program, symbols)]
+    parts += ["extern uint32_t rcsc_script;", *leaf_values(program, symbols), *_same(program, symbols)]
     parts += [f"int main(void) {{ static {struct} a, b; {symbols.init}(&a);"]
-    parts += ["unsigned long inputs = 0, lines = 0, steps = 0, differ = 0;"]
+    parts += ["uint32_t inputs = 0, lines = 0, steps = 0, differ = 0;"]
     for at, (variable, keys) in enumerate(used):
         values = ", ".join(constant_in_c(variable, key) for key in keys)
         parts.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
@@ -167,8 +119,9 @@ def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
     parts.append(f"steps++; const int32_t fault = {symbols.steps[table.name]}(&a);")
     parts.append("if (fault != r.fault || !same(&a, &b)) { differ++; } }")
     parts += ["}"] * len(used)
-    parts.append('printf("rcsc %lu inputs, %lu lines differ, %lu steps, %lu steps differ\\n",')
-    parts += ["inputs, lines, steps, differ);", "return (lines != 0 || differ != 0); }"]
+    for count, words in COUNTS.items():
+        parts.append(f'say_number({count}); say("{words}");')
+    parts.append("return 0; }")
     return "\n".join(parts) + "\n"
 
 
@@ -188,24 +141,17 @@ def run_cortex(
         number: Position of the table in the program.
         most: How many of its inputs are run at most; edges where they are not all.
     """
-    tools = cortex_tools()
-    if isinstance(tools, Absent):
-        return tools
+    if absent := BOARD.absent():
+        return Absent(f"not installed: {absent}")
     if any(symbols.c_type(variable.name) == "uint64_t" for variable in program.variables):
         return Absent("the reference needs more than the 64 bits with a sign that there are on the target")
     table = program.tables[number]
     with scratch("cortex") as place:
-        (place / "rcsc.ld").write_text(LINKER, "utf-8")
-        (place / "image.c").write_text(image_c(program, symbols, number, most), "utf-8")
-        sources = ["image.c", *write_c(files, place)]
-        built = run_command([tools[0], *FLAGS, *LINK, "-o", "image.elf", *sources], place, TIMEOUT_S)
-        if built.status != 0:
-            return BuildFailed(f"the image for the target was not built: {built.err.strip()[:400]}")
-        ran = run_command([tools[1], *MACHINE, "-kernel", "image.elf"], place, TIMEOUT_S)
-    match = RESULT.search(ran.out)
+        said = run_image(BOARD, place, files, image_c(program, symbols, number, most))
+    if isinstance(said, BuildFailed):
+        return said
+    match = RESULT.search(said)
     if match is None:
-        return BuildFailed(
-            f"the target gave no result (status {ran.status}): {(ran.out + ran.err).strip()[:400]}"
-        )
+        return BuildFailed(f"the target gave no result: {said.strip()[:400]}")
     inputs, lines, steps, differ = (int(number) for number in match.groups())
     return CortexRun(table.name, inputs, choices(program, table, most)[1], steps, lines + differ)

@@ -17,6 +17,7 @@ from rcsc.base.host.children import scratch
 from rcsc.base.host.files import csv_text, read
 from rcsc.base.host.tools import BuildFailed, ending, run_command
 from rcsc.code.emit.plan import Plan
+from rcsc.code.testing.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
 from rcsc.code.testing.cortex import choices, constant_in_c, leaf_values
 from rcsc.code.testing.executors.externs import STAND_INS, c_stand_ins, externs
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
@@ -30,7 +31,6 @@ from rcsc.views.evidence.processors.assembly import (
     of_compiler,
     of_disassembly,
 )
-from rcsc.views.evidence.processors.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
 
 SESSIONS, CYCLES = 64, 12
 """Drawn sessions, and the cycles in each."""

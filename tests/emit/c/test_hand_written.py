@@ -5,7 +5,7 @@ from statistics import median
 
 import pytest
 
-from rcsc.views.evidence.processors.boards import BOARDS
+from rcsc.code.testing.boards import BOARDS
 from tests.bench.acquire import CASES, compared
 
 FACTOR = 1.5

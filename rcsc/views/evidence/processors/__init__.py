@@ -12,5 +12,5 @@ A count is of instructions, never a time: an emulator knows no pipeline, no wait
 
 Trusted: the cross compilers, QEMU's counting, and for a bound the comment at each loop of the C. What it costs: seconds.
 
-Modules: `assembly` (paths), `boards` (processors and their emulators).
+Modules: `assembly` (paths). The processors and their emulators are those of `rcsc.code.testing.boards`.
 """
