@@ -215,10 +215,15 @@ def of_truths(search: InputSearch, plan: Plan) -> Iterator[Case]:
         for group in planned.matcher.groups:
             truths = [probe.index.condition for probe in group if isinstance(probe.index, Truth)]
             ways = product((False, True), repeat=len(truths)) if truths else ()
+            impossible = set[tuple[bool, ...]]()
             for way, rest in islice(product(ways, rests), MOST_ENTRIES):
+                if way in impossible:
+                    continue
                 wanted = [*zip(truths, way, strict=True), *rest, *_given(search.program, table)]
                 given = search.find(wanted)
-                if not isinstance(given, Missing):
+                if given is Missing.NONE and not rest:
+                    impossible.add(way)
+                elif not isinstance(given, Missing):
                     yield Case(Entry("line", str(table.name)), given, origin="mask of conditions")
 
 
