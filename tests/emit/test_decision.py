@@ -63,12 +63,12 @@ def compared(program: Program, count: int) -> Counter[int]:
 @pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 @pytest.mark.parametrize(
     ("lines", "variables", "fault", "widened"),
-    [(9, 4, "ok", 0), (40, 6, "gap", 9), (70, 9, "overlap", 30), (150, 9, "ok", 0), (150, 12, "gap", 60)],
+    [(9, 4, "ok", 0), (40, 6, "gap", 9), (70, 9, "overlap", 30), (150, 12, "gap", 60)],
 )
 def test_every_executor_tells_none_one_and_several(
     lines: int, variables: int, fault: Fault, widened: int
 ) -> None:
-    answers = compared(program_of(box(lines, variables, lines + 1, fault, widened)), 1500)
+    answers = compared(program_of(box(lines, variables, lines + 1, fault, widened)), 900)
     assert len(answers) > min(lines, 60) * 3 // 4
     assert (answers[SEVERAL] > 0) == (widened > 0)
     assert answers[NONE] > 0 or fault != "gap"
