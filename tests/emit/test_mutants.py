@@ -12,7 +12,7 @@ import pytest
 from rcsc.code.testing import suite
 from rcsc.code.testing.code_mutants import Judge, Noticed, code_mutants, variants
 from rcsc.code.testing.esbmc import EsbmcAnswer, EsbmcVerdict
-from rcsc.code.testing.executors.symbols import source_of, symbols_of
+from rcsc.code.testing.executors.symbols import symbols_of, text_of
 from rcsc.code.testing.figures import SuiteResult
 from rcsc.code.testing.inputs.snapshot import Missing, search_in
 from rcsc.code.testing.inputs.vectors import vectors_of
@@ -178,7 +178,7 @@ def test_the_check_of_the_matcher_notices_every_bit_of_a_mask_and_every_class(
     """Also the bits for truths of conditions that no input has together: most of APPROACH."""
     program = shipped(path, repo) if path else classed[0]
     files, [table] = emitted(program), program.tables
-    source = source_of(symbols_of(program, files), files)
+    source = text_of(symbols_of(program, files).source, files)
     assert ("classes[301]" in source) == (not path)
     every = [
         each
@@ -265,7 +265,7 @@ def test_each_part_of_the_c_is_seen_by_some_compilers_and_what_they_do_not_see_i
     """Wherever GNU C and others differ: a mutant of what is not compiled nobody could notice."""
     program = shipped(path, repo)
     files = emitted(program)
-    source = source_of(symbols_of(program, files), files)
+    source = text_of(symbols_of(program, files).source, files)
     assert source.count("#if defined(__GNUC__)\n") > 1
     seen = variants(source)
     for text, ours, theirs in (
@@ -306,7 +306,7 @@ def test_a_mutant_of_what_nothing_proved_calls_is_not_called_equivalent(repo: Pa
     symbols = symbols_of(program, files)
     judge = judge_of(program, files)
     mutants = [
-        each for each in code_mutants(source_of(symbols, files), 4) if each.function == "approach_check"
+        each for each in code_mutants(text_of(symbols.source, files), 4) if each.function == "approach_check"
     ]
     assert len(mutants) > 5
     assert {judge.by_proof(each) for each in mutants} == {Noticed.UNDECIDED}

@@ -25,7 +25,7 @@ from rcsc.code.testing.executors.edges import relational_tests
 from rcsc.code.testing.executors.externs import STAND_INS
 from rcsc.code.testing.executors.native import COMPILE_S, Native
 from rcsc.code.testing.executors.shim import shim_c
-from rcsc.code.testing.executors.symbols import Symbols, source_of
+from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.code.testing.executors.targets import ComparedFunction, targets
 from rcsc.code.testing.matcher import Checked, MatcherCheck
 from rcsc.lang.model import Program, Snapshot
@@ -355,7 +355,7 @@ def portable_agrees(
 ) -> bool:
     """Whether the C without compiler built-ins leaves the same behind; see `judge_code`."""
     with prepared(native, files, sessions, 0.0, {}) as judge:
-        other = variants(source_of(native.symbols, files))[1]
+        other = variants(text_of(native.symbols.source, files))[1]
         return judge is None or judge.by_tests(other) is Noticed.UNDECIDED
 
 
@@ -380,7 +380,7 @@ def prepared(
         for name in ("shim", "extra"):
             run_command([compiler, *FLAGS, "-c", "-o", f"{name}.o", f"{name}.c"], place, COMPILE_S)
         judge = Judge(program, symbols, files, place, compiler, b"", esbmc_s, known)
-        judge.expect(source_of(symbols, files))
+        judge.expect(text_of(symbols.source, files))
         yield judge
 
 
@@ -405,7 +405,7 @@ def judge_code(
         progress: Told which mutant is judged.
     """
     lines = max((len(t.lines) for t in native.program.tables), default=1)
-    every = list(code_mutants(source_of(native.symbols, files), lines))
+    every = list(code_mutants(text_of(native.symbols.source, files), lines))
     masks = [mutant for mutant in every if mutant.change == "mask"]
     others = [mutant for mutant in every if mutant.change != "mask"]
     random = Random(SEED)  # noqa: S311  # a repeatable sample

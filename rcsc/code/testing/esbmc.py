@@ -13,14 +13,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from time import perf_counter
 
 from rcsc.base.host.children import Ran, scratch
 from rcsc.base.host.tools import Absent, esbmc, run_command, write_c
 from rcsc.code.testing.executors.externs import STAND_INS, externs
 from rcsc.code.testing.executors.reference_file import all_lines, monitored, reference_c
-from rcsc.code.testing.executors.symbols import Symbols
+from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.code.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
 from rcsc.lang.model import Program, Read, Real, TableByCommand, Value, VariableName, spell
 
@@ -285,7 +284,7 @@ def prove_function(
 
 def step_parts(symbols: Symbols, files: Mapping[str, str], target: ComparedFunction) -> dict[str, str] | None:
     """The functions that a step runs in turn, read from its text; None if it does anything else."""
-    source = next(text for path, text in files.items() if Path(path).name == symbols.source)
+    source = text_of(symbols.source, files)
     _, _, after = source.partition(f"\nint32_t {target.function}({symbols.struct} *s)\n{{\n")
     body, _, _ = after.partition("\n}\n")
     return next((match.groupdict() for form in STEPS if (match := form.fullmatch(body))), None)

@@ -50,7 +50,7 @@ from rcsc.code.testing.executors.edges import may_be_matched, relational_tests
 from rcsc.code.testing.executors.native import COMPILE_S, FLAGS, of_word, to_word
 from rcsc.code.testing.executors.reference_file import reference_c
 from rcsc.code.testing.executors.shim import WORDS, set_leaves_c
-from rcsc.code.testing.executors.symbols import Symbols, source_of
+from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import boxes_of
 from rcsc.lang.interval_sets import holds as contains
@@ -112,7 +112,7 @@ int main(int argc, char **argv) {{
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What was compared.
+    """The extent of a comparison that found no difference.
 
     Attributes:
         cells: Bits of masks, a line and a combination of classes each.
@@ -125,7 +125,7 @@ class Checked:
 
 @dataclass(slots=True)
 class MatcherCheck:
-    """What is asked of the matcher of one table, found once for all files that it is asked of.
+    """Compares the matcher of one table with it, in any number of files.
 
     Attributes:
         program: The program.
@@ -145,7 +145,7 @@ class MatcherCheck:
     _told: Checked = field(init=False)
 
     def __post_init__(self) -> None:
-        """Finds inputs of each line, what is asked from there, and the masks that the table gives."""
+        """Find inputs of each line, what is asked from there, and the masks that the table gives."""
         self.plan = lower_by_force(self.program)
         self.planned = next(one for one in self.plan.tables if one.table.name == self.table.name)
         groups, starts = self.planned.matcher.groups, self.starts()
@@ -158,13 +158,13 @@ class MatcherCheck:
         self._told = Checked(cells, tuple(name for name, some in starts.items() if not some))
 
     def of(self, files: Mapping[str, str]) -> Checked | tuple[str, ...] | Absent:
-        """Compares the matcher in these files, text by path, with the table."""
+        """Compare the matcher in these files, text by path, with the table; return its differences in words."""
         compiler = c_compiler()
         if isinstance(compiler, Absent):
             return compiler
         with scratch("matcher") as place:
             others = write_c(files, place)
-            (place / "probe.c").write_text(self.probe_c(source_of(self.symbols, files)), "utf-8")
+            (place / "probe.c").write_text(self.probe_c(text_of(self.symbols.source, files)), "utf-8")
             (place / "in.bin").write_bytes(self._asked)
             compiled = run_command([compiler, *FLAGS, "-o", "probe", "probe.c", *others], place, COMPILE_S)
             if compiled.status != 0:
@@ -179,11 +179,11 @@ class MatcherCheck:
 
     @property
     def words(self) -> int:
-        """Words of all masks of the table."""
+        """The number of words of all masks of the table."""
         return sum(len(masks) for _, masks in self._masks) * self.planned.matcher.words
 
     def probe_c(self, source: str) -> str:
-        """C that copies the masks of an emitted file and asks both functions for the line of many inputs; see `axes`."""
+        """Return C that copies the masks of an emitted file and asks both functions for the line of many inputs; see `axes`."""
         number = self.program.tables.index(self.table)
         probe = PROBE.format(
             struct=self.symbols.struct,
@@ -201,11 +201,11 @@ class MatcherCheck:
     # --- masks ---
 
     def masks(self, group: Group) -> tuple[int, ...]:
-        """The masks of a group that the table gives, by class."""
+        """Return the masks of a group that the table gives, by class."""
         return joined(tuple(Probe(probe.index, self.left(probe.index)) for probe in group))
 
     def left(self, index: Index) -> tuple[int, ...]:
-        """For each class of a leaf, or each truth of a condition, the lines that do not exclude it."""
+        """Return for each class of a leaf, or each truth of a condition, the lines that do not exclude it."""
         lines = self.table.lines
         if isinstance(index, Truth):
             free = [
@@ -216,7 +216,7 @@ class MatcherCheck:
         return tuple(_mask(box is None or contains(box, key) for box in boxes) for key in _firsts(index))
 
     def wrong(self, words: Iterable[int]) -> Iterator[str]:
-        """Each mask of the C that is not the table's, in words."""
+        """Yield each mask of the C that is not the table's, in words."""
         words, size = iter(words), self.planned.matcher.words
         for group, masks in self._masks:
             for at, mask in enumerate(masks):
@@ -227,7 +227,7 @@ class MatcherCheck:
     # --- lines ---
 
     def told(self, row: Sequence[int]) -> str:
-        """An input on which the C gives another line than the table, in words."""
+        """Return an input on which the C gives another line than the table, in words."""
         *words, got, right = row
         values = {
             leaf.name: of_word(leaf.type, word, self.symbols.c_type(leaf.name) == "uint64_t")
@@ -237,7 +237,7 @@ class MatcherCheck:
         return f"at {where} the C gives line {got}, the table {right}"
 
     def starts(self) -> dict[str, list["array[int]"]]:
-        """For each line the inputs that match it alone, as words; not more than are asked about."""
+        """Return for each line the inputs that match it alone, as words; not more than are asked about."""
         most = STARTS if relational_tests(self.table) else 1
         starts: dict[str, list[array[int]]] = {str(line.name): [] for line in self.table.lines}
         for one in self.known:
@@ -248,7 +248,7 @@ class MatcherCheck:
         return starts
 
     def axes(self, group: Group) -> Iterator["array[int]"]:
-        """The leaves of a group with the first keys of their classes, and each of them with all of its keys.
+        """Yield the leaves of a group with the first keys of their classes, and each of them with all of its keys.
 
         As words: how many leaves, their positions, how many values each takes, the values.
         """
@@ -259,14 +259,14 @@ class MatcherCheck:
             yield self.taking([(leaf, self.keys(leaf))])
 
     def taking(self, keys_of: Sequence[tuple[Variable, list[int]]]) -> "array[int]":
-        """These leaves with these keys, as words."""
+        """Return these leaves with these keys, as words."""
         leaves = (self.program.variables.index(leaf) for leaf, _ in keys_of)
         lengths = (len(keys) for _, keys in keys_of)
         values = (to_word(leaf.type, value_of_key(leaf.type, key)) for leaf, keys in keys_of for key in keys)
         return array("q", [len(keys_of), *leaves, *lengths, *values])
 
     def keys(self, leaf: Variable) -> list[int]:
-        """The keys that a leaf takes one by one; see the module."""
+        """Return the keys that a leaf takes one by one; see the module."""
         low, high = key_bounds(leaf.type)
         if high - low < EVERY_KEY and not isinstance(leaf.type, Real):
             return list(range(low, high + 1))
@@ -281,6 +281,6 @@ def _mask(bits: Iterable[bool]) -> int:
 
 
 def _firsts(index: Direct | Coded | Cuts) -> list[int]:
-    """The first key of each class of a leaf."""
+    """Return the first key of each class of a leaf."""
     later = (key_of(index.type, first_value(index, number)) for number in range(1, index.count))
     return [key_bounds(index.type)[0], *later]

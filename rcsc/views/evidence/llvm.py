@@ -13,6 +13,7 @@ from typing import Any
 from rcsc.base.host.children import Ran, scratch
 from rcsc.base.host.files.read import Malformed, json_of
 from rcsc.base.host.tools import Absent, BuildFailed, ending, run_command, write_c
+from rcsc.code.testing.executors.symbols import text_of
 
 VERSIONS = ("19", "20", "21", "22")
 """Of LLVM: from 18 on clang measures MC/DC; from 19 on of decisions of more than six conditions."""
@@ -155,7 +156,7 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
     played, shown, exported = said[2], said[4], said[5]
     try:
         data = json_of(exported.raw, plain=False)["data"][0]
-        seen = _read(data, files_text(files, source), shown.out, played.out, played.status == 0)
+        seen = _read(data, text_of(source, files), shown.out, played.out, played.status == 0)
     except (Malformed, LookupError, TypeError):
         return BuildFailed(
             f"what {Path(llvm.cov).name} exports cannot be read: {ending(exported, COMPILE_S)}"
@@ -167,11 +168,6 @@ def _stopped(tool: str, ran: Ran) -> str:
     """Return the reason why a command failed: the first lines of its errors."""
     first = "\n".join(ran.err.strip().splitlines()[:6])
     return first or f"{tool} {ending(ran, COMPILE_S)}"
-
-
-def files_text(files: Mapping[str, str], source: str) -> str:
-    """Return the text of the file of this name."""
-    return next(text for path, text in files.items() if Path(path).name == source)
 
 
 def _read(data: Mapping[str, Any], text: str, shown: str, played: str, passed: bool) -> Measured:

@@ -118,10 +118,8 @@ class Reached:
         planned = next(one for one in self.plan.tables if one.table.name == table.name)
         for probe in (probe for group in planned.matcher.groups for probe in group):
             match probe.index:
-                case Direct(leaf=leaf, type=Bool()):
-                    yield ("class", table.name, leaf, int(before[leaf]))
-                case Cuts(leaf=leaf, cuts=cuts):
-                    yield ("class", table.name, leaf, sum(before[leaf] >= cut for cut in cuts))
+                case Direct(leaf=leaf, type=Bool()) | Cuts(leaf=leaf):
+                    yield ("class", table.name, leaf, class_of(probe.index, before))
 
     def _run(self, case: Case, right: Expected) -> Iterator[Hit]:
         entry, after = case.entry, right.after

@@ -159,14 +159,6 @@ class Meets:
         return bool(self.op.meaning(left, right))
 
 
-Mark: TypeAlias = Condition | End | Compares | Meets
-
-
-def is_mark(op: object) -> bool:
-    """Whether an operator is a mark."""
-    return isinstance(op, Mark)
-
-
 @dataclass(frozen=True, slots=True)
 class Marked:
     """A marked program, its decisions in order, and its comparisons of numbers."""

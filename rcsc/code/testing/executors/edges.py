@@ -34,12 +34,12 @@ MOST_COMPANIONS = 8
 
 
 def reads(expr: Expr) -> set[str]:
-    """Every leaf that `expr` may read."""
+    """Return every leaf that `expr` may read."""
     return set(read_by(expr))
 
 
 def _evaluated(body: Iterable[Statement]) -> Iterator[Expr]:
-    """Every expression of the statements, inner statements included."""
+    """Yield every expression of the statements, inner statements included."""
     for statement in everything(body):
         if isinstance(statement, Case):
             yield from (Among(statement.subject, arm.values) for arm in statement.arms)
@@ -48,12 +48,12 @@ def _evaluated(body: Iterable[Statement]) -> Iterator[Expr]:
 
 
 def relational_tests(table: Table) -> tuple[Test, ...]:
-    """The tests that are no box, in order of their first line."""
+    """Return the tests that are no box, in order of their first line."""
     return tuple(test for test in table.distinct_tests if test.box is None)
 
 
 def all_expressions(program: Program) -> Iterator[Expr]:
-    """Every expression that the executors evaluate."""
+    """Yield every expression that the executors evaluate."""
     for table in program.tables:
         yield from (test.condition for test in table.distinct_tests)
         for line in table.lines:
@@ -82,7 +82,7 @@ def _same_kind(left: Scalar, right: Scalar) -> bool:
 
 
 def leaf_edges(program: Program) -> dict[str, tuple[int, ...]]:
-    """For every leaf the keys at which a test, guard or bound may turn, with their neighbours."""
+    """Return for every leaf the keys at which a test, guard or bound may turn, with their neighbours."""
     kinds = {variable.name: variable.type for variable in program.variables}
     near: dict[str, set[int]] = {name: set() for name in kinds}
     for expr in all_expressions(program):
@@ -109,7 +109,7 @@ def _inside(variable: Variable, near: set[int]) -> tuple[int, ...]:
 
 
 def companions(program: Program) -> dict[str, tuple[str, ...]]:
-    """For every leaf, the leaves of its kind that it is compared with in an expression."""
+    """Return for every leaf the leaves of its kind that it is compared with in an expression."""
     kinds: Mapping[str, Scalar] = {variable.name: variable.type for variable in program.variables}
     compared: dict[str, set[str]] = {}
     for expr in all_expressions(program):
@@ -123,7 +123,7 @@ def companions(program: Program) -> dict[str, tuple[str, ...]]:
 
 
 def representable(kind: Scalar) -> tuple[int, int]:
-    """Least and greatest integer of the C type of a leaf of this kind (not for reals).
+    """Return the least and greatest integer of the C type of a leaf of this kind (not for reals).
 
     Source: the executors' rule, the smallest of the (u)int8 .. 64 types that holds the range.
     """
@@ -137,7 +137,7 @@ def representable(kind: Scalar) -> tuple[int, int]:
 
 
 def outside(kind: Scalar) -> tuple[Value, ...]:
-    """Readings that a C variable of this kind can hold and that lie outside the range."""
+    """Return readings that a C variable of this kind can hold and that lie outside the range."""
     if isinstance(kind, Real):
         low, high = key_bounds(kind)
         beyond = [float(value_of_key(kind, key)) for key in (low - 1, high + 1)]
@@ -151,7 +151,7 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
 
 
 def may_be_matched(program: Program, table: Table, snapshot: Snapshot) -> bool:
-    """Whether the table's conditions are defined: the invariants hold, and no stopping assumption fails."""
+    """Return whether the table's conditions are defined: the invariants hold, and no stopping assumption fails."""
     rests = [invariant.condition for invariant in program.invariants]
     rests += [assumption.condition for assumption in program.assumptions if assumption.name in table.stops]
     return all(holds(condition, snapshot) for condition in rests)

@@ -30,7 +30,7 @@ COMPILE_S = 300.0
 
 @dataclass(frozen=True, slots=True)
 class NativeRun:
-    """What one run left behind.
+    """The result of one run, and the state after it.
 
     Attributes:
         result: What the function gave: a line index, or a fault code.
@@ -46,7 +46,7 @@ class NativeRun:
 
 
 def to_word(kind: Scalar, value: Value) -> int:
-    """A value as the signed 64-bit word that the shim takes."""
+    """Return a value as the signed 64-bit word that the shim takes."""
     if isinstance(kind, Real):
         word: int = struct.unpack("<q", struct.pack("<d", float(value)))[0]
         return word
@@ -55,7 +55,7 @@ def to_word(kind: Scalar, value: Value) -> int:
 
 
 def of_word(kind: Scalar, word: int, unsigned: bool) -> Value:
-    """The value that a word stands for."""
+    """Return the value that a word stands for."""
     if isinstance(kind, Real):
         value: float = struct.unpack("<d", struct.pack("<q", word))[0]
         return value
@@ -81,7 +81,7 @@ class Native:
         self.folder.close()
 
     def rows(self, snapshots: Sequence[Snapshot]) -> "array[int]":
-        """The snapshots as words, row after row."""
+        """Return the snapshots as words, row after row."""
         packed = array("q")
         for snapshot in snapshots:
             packed.extend(to_word(v.type, snapshot[v.name]) for v in self.program.variables)
@@ -97,7 +97,7 @@ class Native:
         return self.results(output)
 
     def results(self, output: "array[int]") -> list[NativeRun]:
-        """Rows of words as results."""
+        """Return rows of words as results."""
         width, count = words(self.program), len(monitored(self.program))
         leaves = [
             (str(v.name), v.type, self.symbols.c_type(v.name) == "uint64_t") for v in self.program.variables
@@ -132,7 +132,7 @@ class Native:
 
 
 def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequence[int]) -> NativeRun:
-    """A row as a result; `leaves` has the name and type of each leaf, and whether C holds it in 64 bits without a sign."""
+    """Return a row as a result; `leaves` has the name and type of each leaf, and whether C holds it in 64 bits without a sign."""
     failed = tuple(at for at in range(count) if row[TRACE_WORDS + at])
     given = zip(leaves, row[TRACE_WORDS + count :], strict=True)
     snapshot = {name: of_word(kind, word, unsigned) for (name, kind, unsigned), word in given}

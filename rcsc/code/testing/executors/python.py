@@ -6,14 +6,13 @@ it is, from memory, under a name of its own.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from rcsc.code.testing.executors.externs import PythonStandIns
 from rcsc.code.testing.executors.reference_file import fault_named, monitored
 from rcsc.code.testing.executors.sessions import Seen, Stimuli
-from rcsc.code.testing.executors.symbols import Symbols
+from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.code.testing.executors.targets import ComparedFunction
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Program, Snapshot, Value
@@ -95,6 +94,6 @@ def python_executor(
         files: The emitted files, text by path.
         stand_ins: Stand-ins for the program's externs, where it has any.
     """
-    text = next(text for path, text in files.items() if Path(path).name == symbols.module)
+    text = text_of(symbols.module, files)
     module = (stand_ins or PythonStandIns(program, {})).load(text, f"rcsc_tested_{symbols.program}")
     return PythonUnderTest(program, symbols, module)

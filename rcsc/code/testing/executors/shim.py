@@ -52,12 +52,12 @@ int main(int argc, char **argv) {{
 
 
 def words(program: Program) -> int:
-    """Words that one row gives back."""
+    """Return the number of words that one row gives back."""
     return TRACE_WORDS + len(monitored(program)) + len(program.variables)
 
 
 def set_leaves_c(program: Program, symbols: Symbols) -> Iterator[str]:
-    """A C function that sets the inputs of a struct, or every leaf, from words."""
+    """Yield a C function that sets the inputs of a struct, or every leaf, from words."""
     yield f"static void set_leaves({symbols.struct} *s, const int64_t *in, int whole) {{"
     for at, variable in enumerate(program.variables):
         value = f"of_word(in[{at}])" if isinstance(variable.type, Real) else f"in[{at}]"
@@ -110,7 +110,7 @@ def _run(program: Program, symbols: Symbols) -> Iterator[str]:
 
 
 def shim_c(program: Program, symbols: Symbols) -> str:
-    """The whole shim; a function's number is twice its target's position, the reference's one more."""
+    """Return the whole shim; a function's number is twice its target's position, the reference's one more."""
     scripted = bool(externs(program))
     shape = {
         "script": "rcsc_script = (uint32_t)mode >> 1;" if scripted else "",

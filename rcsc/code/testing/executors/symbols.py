@@ -129,9 +129,9 @@ def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
     raise KeyError(program.name)
 
 
-def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
-    """Return the text of the emitted C file."""
-    return next(text for path, text in files.items() if Path(path).name == symbols.source)
+def text_of(name: str, files: Mapping[str, str]) -> str:
+    """Return the text of the file of this name; files by path."""
+    return next(text for path, text in files.items() if Path(path).name == name)
 
 
 def _symbols(document: Mapping[str, Any]) -> Symbols:

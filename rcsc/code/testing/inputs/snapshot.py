@@ -104,7 +104,6 @@ class InputSearch:
     variables: Mapping[str, Variable]
     edges: Mapping[str, tuple[int, ...]]
     near: Mapping[str, tuple[str, ...]]
-    asked: int = 0
 
     def find(self, wanted: Sequence[Wanted], prefer: Snapshot | None = None) -> Snapshot | Missing:
         """A snapshot with the wanted truths, as near to `prefer` as is cheap."""
@@ -175,7 +174,6 @@ class InputSearch:
             return Missing.NONE
         if self.solver is None:
             return Missing.UNKNOWN
-        self.asked += 1
         return self.solver(self.program, conjunction(wanted))
 
     def _guesses(
