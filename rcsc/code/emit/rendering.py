@@ -194,7 +194,7 @@ def folded(line: str) -> Iterator[str]:
     the sign of an assignment where nothing else is left.
 
     >>> list(folded("    x = " + " + ".join(["a_quite_long_name"] * 7) + ";"))[1]
-    '            a_quite_long_name;'
+    '            a_quite_long_name + a_quite_long_name;'
     """
     if len(line) <= WIDTH or line.startswith("#") or END in line:
         yield line

@@ -58,30 +58,17 @@ def _told(missed: Missed) -> dict[str, object]:
     return {name: getattr(missed, name) for name in ("function", "line", "what", "reason")}
 
 
-def _counts(seen: Measured, missed: Sequence[Missed]) -> list[tuple[str, int, int, int]]:
-    """Return for statements, branches and MC/DC: all, those covered, and of the others those out of reach."""
-    kinds = {"statement": [m for m in missed if m.what == "statement"]}
-    kinds["mcdc"] = [m for m in missed if m.what.startswith("condition ")]
-    kinds["branch"] = [m for m in missed if m not in kinds["statement"] and m not in kinds["mcdc"]]
-    alls = {
-        "statement": len(seen.regions),
-        "branch": 2 * len(seen.branches),
-        "mcdc": sum(len(decision.shown) for decision in seen.decisions),
-    }
-    words = {
-        "statement": "blocks of statements",
-        "branch": "outcomes of branches",
-        "mcdc": "MC/DC conditions",
-    }
-    return [
-        (words[kind], alls[kind], alls[kind] - len(left), sum(bool(m.reason) for m in left))
-        for kind, left in ((kind, kinds[kind]) for kind in words)
-    ]
+def _kind_of(missed: Missed) -> str:
+    """Return the count of `Measured.counts` that lacks it."""
+    if missed.what == "statement":
+        return "blocks of statements"
+    return "MC/DC conditions" if missed.what.startswith("condition ") else "outcomes of branches"
 
 
 def _figures(llvm: Tools, document: VectorSet, seen: Measured, missed: Sequence[Missed]) -> tuple[str, ...]:
     lines = [figure(document).partition(": ")[2]]
-    for words, every, covered, reasoned in _counts(seen, missed):
+    for words, (every, covered) in seen.counts.items():
+        reasoned = sum(bool(each.reason) for each in missed if _kind_of(each) == words)
         reach = f", {reasoned} shown to be out of reach" if reasoned else ""
         left = every - covered - reasoned
         lines.append(f"{covered} of {every} {words}{reach}{f', {left} open' if left else ''}")

@@ -96,6 +96,16 @@ class Measured:
     played: str
     passed: bool
 
+    @property
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """For statements, branches and MC/DC, in words: all, and those that were covered."""
+        covered = {
+            "blocks of statements": [region.count > 0 for region in self.regions],
+            "outcomes of branches": [n > 0 for point in self.branches for n in (point.true, point.false)],
+            "MC/DC conditions": [each for decision in self.decisions for each in decision.shown],
+        }
+        return {words: (len(each), sum(each)) for words, each in covered.items()}
+
 
 def tools() -> Tools | Absent:
     """Return the newest tools whose formats this module knows."""

@@ -3,7 +3,7 @@
 In: a linked system and its files. Out: evidence, as of a program.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -63,7 +63,7 @@ def _coverage(whole: Whole) -> Evidence:
     missed = [*_missed(whole, seen)]
     reasoned = sum(bool(each.reason) for each in missed)
     figures = (
-        *(f"{covered} of {every} {words}" for words, every, covered in _counts(seen)),
+        *(f"{covered} of {every} {words}" for words, (every, covered) in seen.counts.items()),
         f"{len(missed)} not covered, {reasoned} of them shown to be out of reach",
         f"by llvm-cov {llvm.version}, in {STEPS} drawn steps; what a step must give is compared by `rcsc test`",
     )
@@ -77,15 +77,6 @@ def _coverage(whole: Whole) -> Evidence:
     rows += [(str(each.line), each.function, each.what, each.reason) for each in missed]
     files = {"drawn.c": main, "coverage.txt": seen.text, "missed.csv": csv_text(rows)}
     return Evidence(figures, files, tuple(short))
-
-
-def _counts(seen: Measured) -> Sequence[tuple[str, int, int]]:
-    """Return for statements, branches and MC/DC: all, and those that were covered."""
-    outcomes = [count > 0 for point in seen.branches for count in (point.true, point.false)]
-    shown = [each for decision in seen.decisions for each in decision.shown]
-    blocks = [region.count > 0 for region in seen.regions]
-    words = ("blocks of statements", "outcomes of branches", "MC/DC conditions")
-    return [(word, len(all_), sum(all_)) for word, all_ in zip(words, (blocks, outcomes, shown), strict=True)]
 
 
 def _missed(whole: Whole, seen: Measured) -> Iterator[Missed]:
