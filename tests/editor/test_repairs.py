@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.diagnostics.diagnostic import Change, ChangeKind, Proposal
 from rcsc.base.diagnostics.source import Source
 from rcsc.desk.editor import Workspace
 from rcsc.desk.editor.places import Lines
@@ -14,6 +15,7 @@ from rcsc.driver.settings import Settings
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.tree import File
+from rcsc.lang.written.changes import with_proposal
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.findings.unread import TOLD
 
@@ -221,3 +223,19 @@ def test_what_is_only_checked_says_nothing_that_was_to_be_proved(
     checked = [repair for _, repair, _ in mended(Workspace(), str(tmp_path / "a.rcs"), written)]
     assert [repair.title for repair in checked] == [repair.title for repair in known]
     assert not any(repair.certain or repair.proved for repair in checked)
+
+
+def test_a_comment_in_a_row_that_a_cell_leaves_stays() -> None:
+    """The cell stood over two rows, of which the second holds nothing else but the comment."""
+    written = text_of("""
+  | line | w         || out |
+  |------|-----------||-----|
+  | a    | in {0, 1, ||  1  |
+  |      | 2}        ||     | # two grips
+  | b    | >= 3      ||  2  |
+""")
+    change = Change(ChangeKind.CELL, "a", 0, ("<= 2",))
+    after = with_proposal(Source("a.rcs", written), Proposal("say it shorter", "t", "", (change,)))
+    assert after is not None
+    assert "# two grips" in after
+    assert "2}" not in after

@@ -24,7 +24,8 @@ from rcsc.lang.written.tables import (
 )
 
 _MEANT = re.compile(r"did you mean `([^`]+)`\?$")
-_Splice = tuple[int, int, str]
+Splice = tuple[int, int, str]
+"""Start and end of a part of a text, and what replaces it."""
 
 
 def with_proposal(source: Source, proposal: Proposal) -> str | None:
@@ -66,14 +67,14 @@ def formatted(source: Source, end: str = "") -> str | None:
     return text if end == "\n" else text.replace("\n", end)
 
 
-def spliced(text: str, splices: Sequence[_Splice]) -> str:
+def spliced(text: str, splices: Sequence[Splice]) -> str:
     """Return the text with parts of it, from start to end, replaced."""
     for start, end, new in sorted(splices, reverse=True):
         text = text[:start] + new + text[end:]
     return text
 
 
-def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
+def _splices(text: str, table: WrittenTable, change: Change) -> list[Splice] | None:
     if change.place is ChangeKind.LINE:
         return _new_line(text, table, change)
     at, rows = _line(table, change.line)
@@ -86,9 +87,9 @@ def _splices(text: str, table: WrittenTable, change: Change) -> list[_Splice] | 
             stub = joined_cells(rows).conditions[0]
             same = [cell.text for cell in stub_of(stub).same]
             word = f"{stub.text}, {change.texts[0]}" if same and stub.text.endswith(same[-1]) else ""
-            return _over(text, stub, word or f"{stub.text} same {', '.join(change.texts)}", rows)
+            return over(text, stub, word or f"{stub.text} same {', '.join(change.texts)}", rows)
         case ChangeKind.UNREACHABLE:
-            return _over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
+            return over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
         case _:
             every = [row for part in table.parts for row in part.lines[at]]
             return [(*whole_line(text, row), "") for row in every]
@@ -103,30 +104,30 @@ def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
     return 0, ()
 
 
-def _cell(text: str, table: WrittenTable, line: int, column: int, new: str) -> list[_Splice] | None:
+def _cell(text: str, table: WrittenTable, line: int, column: int, new: str) -> list[Splice] | None:
     """Write a condition, in the part of the table that has its column."""
     for part in table.parts:
         many = len(joined_cells(part.heading).conditions) - 1
         if column < many and line < len(part.lines):
             rows = part.lines[line]
             cells = joined_cells(rows).conditions
-            return _over(text, cells[column + 1], new, rows) if column + 1 < len(cells) else None
+            return over(text, cells[column + 1], new, rows) if column + 1 < len(cells) else None
         column -= many
     return None
 
 
-def _over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[_Splice]:
-    """Write a cell into the first of its rows, and leave out rows that have nothing else."""
+def over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[Splice]:
+    """Write a cell into the first of its rows, and leave out rows that have nothing else, a comment neither."""
     first, *more = pieces(cell)
-    splices: list[_Splice] = [(*first, new if first[0] != first[1] else f" {new} ")]
+    splices: list[Splice] = [(*first, new if first[0] != first[1] else f" {new} ")]
     for start, end in more:
         row = next(row for row in rows if row.start <= start < row.past)
         alone = not any(each.text for each in cells_of(row).all if each.start != start)
-        splices.append((*whole_line(text, row), "") if alone else (start, end, ""))
+        splices.append((*whole_line(text, row), "") if alone and "#" not in row else (start, end, ""))
     return splices
 
 
-def _new_line(text: str, table: WrittenTable, change: Change) -> list[_Splice] | None:
+def _new_line(text: str, table: WrittenTable, change: Change) -> list[Splice] | None:
     """Write a line after the last, in each part of the table."""
     names = {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
     name = fresh_name(names)

@@ -12,7 +12,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.syntax.rows import Cell, Cells, stub_of
-from rcsc.lang.written.changes import formatted, spliced
+from rcsc.lang.written.changes import Splice, formatted, over, spliced
 from rcsc.lang.written.tables import (
     RowText,
     WrittenPart,
@@ -31,7 +31,6 @@ MOST_CELLS = 20_000
 LONGEST_CELL = 4_000
 STUB = -1
 """The column of the line's name and marks."""
-_Splice = tuple[int, int, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +109,7 @@ def with_cells(text: str, name: str, changes: Sequence[tuple[GridCell, str]]) ->
     if len(changes) > MOST_CELLS:
         raise Refused(Code.STUDIO, f"more than {MOST_CELLS} cells at once")
     wanted = {place: _checked(new) for place, new in changes}
-    splices = list[_Splice]()
+    splices = list[Splice]()
     headings, stubs, cells = list(before.headings), list(before.stubs), [list(row) for row in before.cells]
     for place, new in wanted.items():
         if not (-1 <= place.line < len(before.stubs) and -1 <= place.column < len(before.headings)):
@@ -151,7 +150,7 @@ def with_line(text: str, name: str, at: int, cells: Sequence[str] = (), stub: st
         raise Refused(Code.STUDIO, f"table `{name}` has no place {at} for a line")
     row = tuple(_checked(cell) for cell in cells) or ("",) * len(before.headings)
     stub = _checked(stub) or fresh(before, at)
-    splices, column, action = list[_Splice](), 0, before.conditions
+    splices, column, action = list[Splice](), 0, before.conditions
     for part in table.parts:
         heading = joined_cells(part.heading)
         many, more = len(heading.conditions) - 1, len(heading.actions)
@@ -328,18 +327,13 @@ def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
     return formatted(Source("", after), "\n") or after if before != after else after
 
 
-def _cell_splices(text: str, table: WrittenTable, place: GridCell, new: str) -> Iterator[_Splice]:
-    """Yield what writes a cell into the first of its rows, and takes it out of the others."""
+def _cell_splices(text: str, table: WrittenTable, place: GridCell, new: str) -> Sequence[Splice]:
+    """Return what writes a cell into the first of its rows, and takes it out of the others."""
     rows, cell = _found(table, place)
     whole = joined_cells(rows)
     if cell not in whole.all:  # the row ends before it
         raise Refused(Code.STUDIO, "this line has other cells than the heading", "mend it in the text")
-    first, *more = pieces(cell)
-    yield (*first, new if first[0] != first[1] else f" {new} ")
-    for start, end in more:
-        row = next(row for row in rows if row.start <= start < row.past)
-        alone = not any(each.text for each in cells_of(row).all if each.start != start)
-        yield (*whole_line(text, row), "") if alone and "#" not in row else (start, end, "")
+    return over(text, cell, new, rows)
 
 
 def _found(table: WrittenTable, place: GridCell) -> tuple[tuple[RowText, ...], Cell]:
@@ -359,7 +353,7 @@ def _found(table: WrittenTable, place: GridCell) -> tuple[tuple[RowText, ...], C
     raise Refused(Code.STUDIO, "this line is not in every part of the table", "mend it in the text")
 
 
-def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[_Splice]:
+def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[Splice]:
     """Yield the splices that write changed stubs in every part, and new names where other lines name a line by its old one."""
     renamed = {
         name_of(old): name_of(new)
@@ -413,7 +407,7 @@ def _part_of(table: WrittenTable, at: int, *, action: bool, inside: bool = False
 
 def _reshaped(
     table: WrittenTable, part: WrittenPart, change: Callable[..., tuple[tuple[str, ...], tuple[str, ...]]]
-) -> Iterator[_Splice]:
+) -> Iterator[Splice]:
     """Yield the splices that give every row of a part other cells; `change` is told whether a row is the first of the heading."""
     for row in table.rows_of(part):
         body, mark, comment = row.partition("#")
@@ -434,7 +428,7 @@ def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " 
     return f"|{left}||{right}"
 
 
-def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> _Splice:
+def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> Splice:
     """Return the splice that writes a row before the line at a position of a part."""
     if at < len(part.lines):
         start, _ = whole_line(text, part.lines[at][0])
