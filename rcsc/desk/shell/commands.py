@@ -302,7 +302,7 @@ class Commands:
         return None
 
     def proves(self, line: str) -> bool:
-        """Whether a line has something proved or compiled: tables that are taken or compared, and parts that run by name."""
+        """Return whether a line proves or compiles: it takes or compares tables, or runs a part by name."""
         text = line.partition("#")[0].strip()
         word = text.partition(" ")[0].casefold()
         return word in {"diff", "reload"} or not (
@@ -310,12 +310,12 @@ class Commands:
         )
 
     def proves_together(self, line: str) -> bool:
-        """Whether a line has the levels proved together before it does anything, which may take minutes."""
+        """Return whether a line first has the levels proved together, which may take minutes."""
         word, _, rest = line.partition("#")[0].strip().partition(" ")
         return word.casefold() == "reload" and "proved" in _flags(rest)[1]
 
     def stepped(self, alone: str = "") -> Output:
-        """What `step` shows, or `step LEVEL`."""
+        """Return the text of `step`, or of `step LEVEL`."""
         if alone:
             return [f"{alone} alone: {_at(self.session.system.level(alone))}"]
         return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]

@@ -68,7 +68,7 @@ def _script(system: Description, wanted: Opening) -> str:
 
 
 def _stage(system: Description, signs: Mapping[str, Signature], wanted: Opening) -> Staged:
-    """What stands outside; a declared plant is left out where the data is not there of which it would be made.
+    """Return what stands outside; a declared plant is left out where the data is not there of which it would be made.
 
     Raises:
         CodedError: The plant or the script that was named is not in order.

@@ -34,7 +34,7 @@ class StateQuery:
 
 
 def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> StateQuery:
-    """What the text asks.
+    """Return the query that the text asks.
 
     Raises:
         Refused: It is no question, or names what is not there.
@@ -66,5 +66,5 @@ def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) ->
 
 
 def asked(query: StateQuery, levels: Sequence[RunningLevel]) -> bool:
-    """Whether it holds now."""
+    """Return whether it holds now."""
     return query.holds({level.name: level.values for level in levels})

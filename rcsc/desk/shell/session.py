@@ -88,11 +88,11 @@ class Session:
         return self.system.level(self.chosen)
 
     def spec(self, name: str) -> LevelSpec:
-        """What the description says of a level."""
+        """Return the level's part of the description."""
         return next(level for level in self.system.description.levels if level.name == name)
 
     def question(self, text: str) -> StateQuery:
-        """What a condition asks.
+        """Return the query of a condition.
 
         Raises:
             Refused: It is none.
@@ -100,7 +100,7 @@ class Session:
         return question(text, self.levels, self.level)
 
     def program(self, level: RunningLevel) -> Program:
-        """What a level's tables mean.
+        """Return the program of a level's tables.
 
         Raises:
             Refused: The sources are not those of the executors.
@@ -275,7 +275,7 @@ class Session:
         return len(self._past)
 
     def holds(self, what: StateQuery | NamedLine) -> bool:
-        """Whether `run until` would have nothing to do: the condition holds already."""
+        """Return whether `run until` would have nothing to do: the condition holds already."""
         return isinstance(what, StateQuery) and stands(what, self.levels)
 
     def changed(self) -> list[str]:
@@ -427,14 +427,14 @@ class Session:
         return old, reloaded, replace(judged, notes=(*judged.notes, known))
 
     def _meaning(self, level: RunningLevel) -> Program | None:
-        """What a level's tables mean; None where their sources are not known."""
+        """Return the program of a level's tables; None where their sources are not known."""
         try:
             return self.program(level)
         except Refused:
             return None
 
     def _compiled(self, name: str) -> bool:
-        """Whether a level's executors were made of the sources that were there when it began to run."""
+        """Return whether a level's executors were made of the sources that were there when it began to run."""
         try:
             self.program(self.system.level(name))
         except Refused:

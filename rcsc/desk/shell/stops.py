@@ -30,12 +30,12 @@ class Stop:
 
 
 def stands(what: StateQuery | NamedLine, levels: Levels) -> bool:
-    """Whether the condition holds, or the line was the level's last."""
+    """Return whether the condition holds, or the line was the level's last."""
     return asked(what, levels) if isinstance(what, StateQuery) else what.matched(level_of(what.level, levels))
 
 
 def reached(what: StateQuery | NamedLine) -> str:
-    """What was come to, in words."""
+    """Return the reason of the stop, in words."""
     return f"`{what.text}` holds" if isinstance(what, StateQuery) else f"line {what}"
 
 

@@ -23,7 +23,7 @@ class NamedLine:
     line: str
 
     def matched(self, level: RunningLevel) -> bool:
-        """Whether the level's last cycle ran it."""
+        """Return whether the level's last cycle ran it."""
         return (self.table, self.line) in level.lines
 
     def __str__(self) -> str:
@@ -141,7 +141,7 @@ MOST_MEMBERS = 40
 
 
 def kind_of(leaf: Leaf) -> str:
-    """What a leaf may be, in words."""
+    """Return the values that a leaf may have, in words."""
     if leaf.members:
         more = len(leaf.members) - MOST_MEMBERS
         others = f" and {more} more" if more > 0 else ""

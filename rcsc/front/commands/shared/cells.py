@@ -10,7 +10,7 @@ from rcsc.views.pages.drawn import Drawing, DrawnCell
 
 
 def cell_of(log: Log, path: Path) -> DrawnCell:
-    """What a description's data draws of a log.
+    """Return what draws a log with the description's data.
 
     Raises:
         BadDescription: It is of another system, or of none that is compiled, or nobody knows its data.
