@@ -49,7 +49,7 @@ from tests.support.programs.stages import emitted
 REPO = Path(__file__).parents[1]
 CACHE = REPO / "tables" / ".rcsc-cache" / "faults"
 EFFORT = Effort()
-MOST_TICKS = 1500
+MOST_TICKS = 1600
 EPISODES: tuple[Episode, ...] = (
     ACQUIRE,
     replace(

@@ -259,25 +259,11 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
         BadDescription: A program has no such level.
         NotBuilt: The C could not be built.
     """
-    return several_executors(system, signs, kind)()
-
-
-def several_executors(
-    system: Description, signs: Mapping[str, Signature], kind: Kind
-) -> Callable[[], dict[str, Executor]]:
-    """Return a function that makes an executor for each level, new ones at each call, of C that is read and built once.
-
-    Raises:
-        BadDescription: A program has no such level.
-        NotBuilt: The C could not be built.
-    """
     levels = {name: sign.level_of(name) for name, sign in signs.items()}
     if kind == "python":
-        return lambda: {
-            name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()
-        }
+        return {name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()}
     library = build(system.generated, list({sign.program: sign for sign in signs.values()}.values()))
-    return lambda: {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
+    return {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
 
 
 def assemble(

@@ -134,7 +134,7 @@ def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(
     assert caught.caught
     assert "gripper: grasp: the command ends" in caught.how
     assert "gripper: position: line 5 is reached" in caught.how
-    assert by_campaign(fault) == Answer(True, "episode 3: ends in DONE or FAIL")
+    assert by_campaign(fault) == Answer(True, "episode 3: task: every command ends")
 
 
 def test_only_the_episodes_know_what_the_fingers_do(sound: Mapping[str, Standing]) -> None:

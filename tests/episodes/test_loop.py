@@ -9,7 +9,6 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,10 +19,8 @@ from hypothesis import strategies as st
 from rcsc.run.adopt import Begun
 from rcsc.run.episodes.episode import BufferFault, Harm, Restart
 from rcsc.run.episodes.harm import HarmedMemory
-from rcsc.run.executors import Library, build
 from rcsc.run.log.read import read
 from rcsc.run.log.replay import Replay
-from rcsc.run.signature import Signature
 from rcsc_cell.database.build import BadData
 from rcsc_cell.episodes.episode import (
     FAULTS,
@@ -38,7 +35,7 @@ from rcsc_cell.episodes.episode import (
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.episodes.part_faults import fault_classes
 from rcsc_cell.episodes.sampling import draw
-from tests.support.loops import ACQUIRE, TBOX, keep
+from tests.support.loops import ACQUIRE, keep
 from tests.support.strategies_episodes import LEVELS, episodes, harms
 
 HERE = Path(__file__).parents[1]
@@ -61,25 +58,6 @@ def test_they_hold_with_physics(seed: int) -> None:
     episode = replace(draw(seed, "mujoco"), step_s=0.004)
     outcome = run(episode)
     assert not outcome.findings, keep(episode, outcome)
-
-
-def test_the_executors_of_an_episode_and_their_twins_are_read_and_built_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Counted, since a campaign has thousands of episodes; both have states of their own."""
-    read_for: list[object] = []
-
-    def counted(generated: Path, signs: Sequence[Signature]) -> Library:
-        read_for.append(signs)
-        return build(generated, signs)
-
-    monkeypatch.setattr("rcsc.run.system.build", counted)
-    loop = Loop(Episode(parts=TBOX), SYSTEM)
-    assert len(read_for) == 1
-    level, twin = loop.system.levels[0], loop.state.twins[loop.system.levels[0].name]
-    before = twin.values()
-    level.run()
-    assert level.values != before == twin.values()
 
 
 @pytest.mark.parametrize("path", CASES, ids=[path.stem for path in CASES])

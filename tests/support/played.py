@@ -15,6 +15,7 @@ from random import Random
 
 from rcsc.run.campaign.rig import known_lines
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
+from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
 
@@ -57,7 +58,12 @@ def stuck(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     return replace(episode, faults=(FaultSpec(STUCK, 0, 9),)) if seed % 8 == 0 else episode
 
 
-def play(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutcome:
+def play(
+    episode: Episode,
+    system: Path,
+    log: Path | None = None,
+    claims: Claims = NOTHING,  # noqa: ARG001  # as any kind's is called
+) -> EpisodeOutcome:
     """What the switches say."""
     _note()
     if log is not None:
@@ -85,15 +91,19 @@ def play(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutc
     )
 
 
-def dawdle(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutcome:
+def dawdle(
+    episode: Episode, system: Path, log: Path | None = None, claims: Claims = NOTHING
+) -> EpisodeOutcome:
     """As `play`, slowly enough to be killed in the middle."""
     time.sleep(0.01)
-    return play(episode, system, log)
+    return play(episode, system, log, claims)
 
 
-def dislike(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> EpisodeOutcome:
+def dislike(
+    episode: Episode, system: Path = SYSTEM, log: Path | None = None, claims: Claims = NOTHING
+) -> EpisodeOutcome:
     """The cell's own run, with a property that no cell keeps: no row fails."""
-    outcome = run_in_cell(episode, system, log)
+    outcome = run_in_cell(episode, system, log, claims)
     bad = [
         EpisodeFinding("no row fails", row.ticks, row.reason) for row in outcome.rows if row.state == "failed"
     ]

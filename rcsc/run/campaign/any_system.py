@@ -100,5 +100,4 @@ def _chunk(system: Path, plant: str) -> int:
 ANY = EpisodeKind(
     draw, run, Episode.from_json, _admit, fault_classes, fault_names, _files,
     not_in_order=(BadDescription, BadPlant, BadScript, NotBuilt, ModuleNotFoundError), chunk=_chunk, told=Episode.told,
-    watched=run,
 )  # fmt: skip

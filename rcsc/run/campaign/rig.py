@@ -66,7 +66,7 @@ class EpisodeKind(Generic[E]):
 
     Attributes:
         draw: Makes the episode of a seed, for a system, a plant and a script by their names; empty for its own.
-        run: Runs an episode of a system; the third is where the log goes.
+        run: Runs an episode of a system, with what was proved of it watched; the third is where the log goes.
         read: Makes an episode of its text; raises ValueError in words where it is none.
         admit: Gives a saved episode, which may come from anybody, as it is to run on a system and a plant; raises ValueError where it
             names what they have not.
@@ -78,12 +78,11 @@ class EpisodeKind(Generic[E]):
             which is all that a kill loses.
         extra: The extra of the package that it needs.
         takes_script: Whether `draw` takes a script.
-        watched: As `run`, and watches what was proved of the system; None where episodes of the kind cannot.
         told: What happens in an episode, in words, a line each.
     """
 
     draw: Callable[[int, Path, str, str], E]
-    run: Callable[[E, Path, Path | None], EpisodeOutcome]
+    run: Callable[[E, Path, Path | None, Claims], EpisodeOutcome]
     read: Callable[[str], E]
     admit: Callable[[E, Path, str], E]
     fault_classes: Callable[[E, Path], tuple[str, ...]]
@@ -94,7 +93,6 @@ class EpisodeKind(Generic[E]):
     extra: str = "log"
     takes_script: bool = True
     told: Callable[[E], tuple[str, ...]] = _untold
-    watched: Callable[[E, Path, Path | None, Claims], EpisodeOutcome] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +116,8 @@ class Rig(Generic[E]):
     claims: Claims = NOTHING
 
     def run(self, episode: E, log: Path | None) -> EpisodeOutcome:
-        """Run an episode, with what was proved watched where its kind can."""
-        if self.kind.watched is None or not self.claims.levels:
-            return self.kind.run(episode, self.system, log)
-        return self.kind.watched(episode, self.system, log, self.claims)
+        """Run an episode, with what was proved watched."""
+        return self.kind.run(episode, self.system, log, self.claims)
 
     def episode(self, seed: int, index: int) -> E:
         """Episode `index` of the campaign of `seed`."""

@@ -28,7 +28,7 @@ from rcsc.run.plant.bind import PlantFailed
 from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged
 from rcsc.run.signature import STOPPED, Value, Values
-from rcsc.run.system import Outside, System, check_answered, several_executors
+from rcsc.run.system import Outside, System, check_answered, executors
 from rcsc.run.unproved import refuse_unproved
 
 COOL_TICKS = 30
@@ -169,7 +169,6 @@ class Loop:
         system: The running system.
         cycle: What the properties saw last.
         watching: The properties, in order.
-        executors: Makes an executor for each level, others at each call.
 
     Raises:
         CodedError, ValueError: As `check`.
@@ -188,8 +187,7 @@ class Loop:
         }
         self._memory = HarmedMemory(episode.harms, (one for _, one in fields), first)
         self._held = fields
-        self.executors = several_executors(its.system, its.signs, episode.executor)
-        by_level = self.executors()
+        by_level = executors(its.system, its.signs, episode.executor)
         levels = tuple(
             running_level(spec, its.system, its.signs[spec.name], by_level[spec.name], self._stage.queries)
             for spec in its.system.levels

@@ -10,6 +10,7 @@ from rcsc.base.host.files.names import shown
 from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, sources
 from rcsc.run.description import BadDescription, description
 from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.proved.claims import Claims
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.database.build import BadData
@@ -34,13 +35,13 @@ def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa
     )
 
 
-def _run(episode: Episode, system: Path, log: Path | None) -> EpisodeOutcome:
+def _run(episode: Episode, system: Path, log: Path | None, claims: Claims) -> EpisodeOutcome:
     """What became of an episode."""
     from rcsc_cell.episodes.loop import (
         run,  # of an extra, which is asked for by its name before anything is run
     )
 
-    return run(episode, system, log)
+    return run(episode, system, log, claims)
 
 
 def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG001  # it runs on its own

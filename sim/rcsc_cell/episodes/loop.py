@@ -9,8 +9,10 @@ from pathlib import Path
 
 from rcsc.run.episodes import loop
 from rcsc.run.episodes.cycle import Broken, Cycle
-from rcsc.run.episodes.operator import CHANGED
+from rcsc.run.episodes.episode import OrderSpec
+from rcsc.run.episodes.operator import CHANGED, Given, OrderLine
 from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.orders.roles import field_of
 from rcsc.run.orders.script import BadScript
 from rcsc.run.plant.staged import Staged
@@ -27,8 +29,6 @@ from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
 
 NUMBERS = ("inc_command", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector")
 """Fields of TASK's orders that are no words."""
-MOST_TICKS_A_ROW = 2500
-"""A run is given up after so many ticks for each row."""
 USUAL: Mapping[str, float] = {switch.name: getattr(Faults(), switch.name) for switch in fields(Faults)}
 """How each switch stands when nothing is wrong: bools, integers and floats."""
 
@@ -40,6 +40,7 @@ class Loop(loop.Loop):
         episode: What to run.
         system: The description of the system.
         properties: What watches, beside what watches any system.
+        claims: What was proved of the system, which is watched, too.
 
     Attributes:
         state: What the cell's properties saw last.
@@ -51,7 +52,11 @@ class Loop(loop.Loop):
     """
 
     def __init__(
-        self, episode: Episode, system: Path = SYSTEM, properties: Sequence[PropertyClass] = PROPERTIES
+        self,
+        episode: Episode,
+        system: Path = SYSTEM,
+        properties: Sequence[PropertyClass] = PROPERTIES,
+        claims: Claims = NOTHING,
     ) -> None:
         its, self.database = ready(system)
         refused = ""
@@ -64,7 +69,7 @@ class Loop(loop.Loop):
         lying = [lying_at(self.database, part) for part in episode.parts]
         self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
         around = loop.Around(Staged((self.plant,), self.database.queries), self.orders)
-        super().__init__(episode.in_any_system(), its, around=around)
+        super().__init__(episode.in_any_system(), its, claims, around)
         self._end = refused
         seen = self.cycle
         self.cycle = self.state = CycleState(
@@ -76,17 +81,17 @@ class Loop(loop.Loop):
             seen.left,
             database=self.database,
             plant=self.plant,
-            twins=self.executors(),
             bodies=tuple(part.body for part in lying),
         )
         self.state.look()
         self.properties = [make(self.state) for make in properties]
         self.watching.append(self)
-        latest = max((interruption.tick for interruption in episode.interruptions), default=0)
-        self._most = latest + MOST_TICKS_A_ROW * (len(episode.rows) + len(episode.interruptions) + 1)
+        task = next(served for served in its.served if served.level == "task")
+        self._line = OrderLine(task, (), self.orders.station.task)
+        self.orders.lines = (self._line,)
         self._set: dict[str, float] = {}
         self._sent: Values = ()
-        self._answered = self._taken = True
+        self._taken = True
 
     def step(self) -> None:
         """One tick."""
@@ -94,8 +99,6 @@ class Loop(loop.Loop):
             if push.tick == self.system.tick:
                 self._push(push)
         super().step()
-        if self.system.tick >= self._most and not self.over:
-            self._end = "hang"
 
     def _ended(self) -> str:
         last = next((end for end in reversed(self.operator.ends) if end.state != CHANGED), None)
@@ -115,7 +118,7 @@ class Loop(loop.Loop):
             mechanism.push(push.part, push.x_mm, push.y_mm)
 
     def _switch(self, tick: int) -> None:
-        """Have on, of the plant's faults, those of this tick, each with its value."""
+        """Have on, of the plant's faults, those of this tick, each with its value; a command has to end in time all the same."""
         wanted = {
             fault.name: fault.value
             for fault in self.in_cell.faults
@@ -124,14 +127,14 @@ class Loop(loop.Loop):
         if wanted != self._set:
             for name, usual in USUAL.items():
                 setattr(self.plant.faults, name, type(usual)(wanted.get(name, usual)))
-        self._on, self._set = frozenset(wanted), wanted
+        self._set = wanted
 
     def _note(self, tick: int) -> None:
         """Which fault classes are at work in this tick."""
         state, episode = self.state, self.in_cell
         now = [harm for harm in episode.transport if harm.first_tick <= tick <= harm.last_tick + harm.ticks]
         state.harmed = frozenset(harm.buffer for harm in now)
-        state.active = self._on.union(harm.kind for harm in now)
+        state.active = frozenset((*self._set, *(harm.kind for harm in now)))
         if state.restarted:
             state.active |= {"restarted"}
         if any(push.tick == tick for push in episode.pushes):
@@ -154,18 +157,20 @@ class Loop(loop.Loop):
 
     def _command(self) -> None:
         """The command under way, and whether it has ended."""
-        state = self.state
+        state, line = self.state, self._line
         state.ended = ""
         sent = self.orders.station.task.sent
         if sent != self._sent:
-            self._sent, self._answered, self._taken = sent, False, False
-            state.command = self._ordered(sent)
+            self._sent, self._taken = sent, False
+            state.command = command = self._ordered(sent)
+            spec = OrderSpec("task", command.name)
+            line.given, line.ended = Given(command.number, spec, state.tick, command.name == "pause"), None
         if state.command is not None and not self._taken:
             self._take(state.command)
-        if not self._answered and state.number_answered:
+        if line.given is not None and line.ended is None and state.number_answered:
             status = state.shown("task", "to_workstation.status_report")
             if status != "executing":
-                self._answered, state.ended = True, status
+                line.ended, state.ended = state.tick, status
 
     def _take(self, command: Command) -> None:
         """What TASK believed when it saw the command."""
@@ -197,17 +202,20 @@ class Loop(loop.Loop):
         )
 
 
-def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> EpisodeOutcome:
+def run(
+    episode: Episode, system: Path = SYSTEM, log: Path | None = None, claims: Claims = NOTHING
+) -> EpisodeOutcome:
     """Runs it to its end, with every property watching.
 
     Args:
         episode: What to run.
         system: The description of the system; its generated executors are used as they are.
         log: Where to keep every cycle (MCAP); none by default.
+        claims: What was proved of the system, which is watched, too.
 
     Raises:
         BadDescription, BadData, NotBuilt: The system is not in order.
         ValueError: The episode names a buffer or a level that is not there.
         OSError: The log cannot be written.
     """
-    return Loop(episode, system).finish(log)
+    return Loop(episode, system, claims=claims).finish(log)

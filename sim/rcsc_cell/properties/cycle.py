@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
 from rcsc.run.episodes.cycle import Cycle
-from rcsc.run.executors import Executor
 from rcsc.run.signature import Value
 from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.mujoco_model import Body
@@ -62,7 +61,6 @@ class CycleState(Cycle):
 
     Attributes:
         bodies: Of the parts, as they were at first.
-        twins: A second executor of each, for whoever wants to run a cycle again.
         command: What TASK was last ordered; None before the first order.
         ended: `done` or `failed` in the cycle in which TASK first says so of this command.
         active: Fault classes at work.
@@ -72,7 +70,6 @@ class CycleState(Cycle):
 
     database: Database
     plant: Plant
-    twins: Mapping[str, Executor]
     bodies: tuple[Body, ...]
     command: Command | None = None
     ended: str = ""

@@ -158,13 +158,11 @@ def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit
 
 
 def _claims(rig: Rig[Any], *, wanted: bool, compiles: bool) -> Claims:
-    """Return the proved claims about the levels, as far as episodes of this kind watch them."""
+    """Return the proved claims about the levels."""
     if not wanted:
         return Claims(why="--no-claims leaves them out")
     if not compiles:
         return Claims(why="--no-compile leaves executors that need not be those of what was proved")
-    if rig.kind.watched is None:
-        return Claims(why="the episodes of this plant are of a kind of their own")
     from rcsc.driver.watched import claims_of  # proves
 
     return claims_of(rig.system, open_cache(rig.system.parent))
