@@ -1,5 +1,7 @@
 """Findings as pages: what each level saw and said in each cycle, and the cell as far as the log says it."""
 
+import contextlib
+import io
 import re
 import shutil
 from collections.abc import Iterator
@@ -101,10 +103,17 @@ def marked(svg: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def published(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("published")
-    assert run(["prove", str(PUBLISHED), "--no-cache", "--log", str(folder)]) == 1
-    return folder
+def proved(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder of the logs, and what the command said of them."""
+    folder, said = tmp_path_factory.mktemp("published"), io.StringIO()
+    with contextlib.redirect_stderr(said):
+        assert run(["prove", str(PUBLISHED), "--no-cache", "--log", str(folder)]) == 1
+    return folder, said.getvalue()
+
+
+@pytest.fixture(scope="module")
+def published(proved: tuple[Path, str]) -> Path:
+    return proved[0]
 
 
 @pytest.fixture(scope="module")
@@ -153,13 +162,11 @@ def test_a_report_is_set_against_the_order_that_stood_before_the_cycle(published
         assert re.match(rf" order no. {cycle} \w+ .*new", given)
 
 
-def test_the_command_that_draws_it_is_named_where_it_is_found(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(["prove", str(PUBLISHED), "--log", str(tmp_path)]) == 1
-    named = re.findall(r"= picture: rcsc (log \S+ --report (\S+))", capsys.readouterr().err)
+def test_the_command_that_draws_it_is_named_where_it_is_found(proved: tuple[Path, str]) -> None:
+    folder, said = proved
+    named = re.findall(r"= picture: rcsc (log \S+ --report (\S+))", said)
     logs = [
-        path for path in tmp_path.glob("*.mcap") if "_then_" not in path.name
+        path for path in folder.glob("*.mcap") if "_then_" not in path.name
     ]  # what follows has logs beside them
     assert len(named) == len(logs) > 7
     for command, page in named:

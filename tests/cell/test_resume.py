@@ -1,5 +1,6 @@
 """A script that stops is resumed: in the same process, in another one, by the command that is printed; or it is said why not."""
 
+import contextlib
 import copy
 import hashlib
 import json
@@ -48,14 +49,24 @@ ROWS = 'MOVE,,,FIX-SAFE,\n"VISE-CLOSE RIGHT, CLOSE LEFT",,,,\nMOVE,,,WS-SAFE,\n"
 QUICK = ["--no-compile", "--executor", "python", "--plant", "kinematic"]
 
 
-@pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Tables, the Python executors and a script of four rows."""
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Tables, the Python executors, a script of four rows, and the database with what is known of it."""
+    folder = tmp_path_factory.mktemp("built")
     leave = shutil.ignore_patterns(".rcsc-cache", "examples")
-    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=leave)
-    shutil.copytree(REPO / "generated", tmp_path / "generated")
-    (tmp_path / "go.csv").write_text(HEAD + ROWS, encoding="utf-8")
-    (tmp_path / "vise.csv").write_text(HEAD + "VISE-CLOSE RIGHT,,,,\n", encoding="utf-8")
+    shutil.copytree(REPO / "tables", folder / "tables", ignore=leave)
+    shutil.copytree(REPO / "generated", folder / "generated")
+    (folder / "go.csv").write_text(HEAD + ROWS, encoding="utf-8")
+    (folder / "vise.csv").write_text(HEAD + "VISE-CLOSE RIGHT,,,,\n", encoding="utf-8")
+    with contextlib.chdir(folder):
+        assert run(["run", "vise.csv", *QUICK, "-q"]) == 0
+    return folder
+
+
+@pytest.fixture
+def project(built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of one's own."""
+    shutil.copytree(built, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
