@@ -25,7 +25,7 @@ from rcsc_cell.properties.cycle import PropertyClass
 from rcsc_cell.properties.failing import REASONS
 from rcsc_cell.properties.truth import CountsTrue, DoneTrue
 from tests.matrix import BUGS, Bug, findings, project, seed
-from tests.support.loops import ACQUIRE, TBOX, trace
+from tests.support.loops import ACQUIRE, TBOX, played
 
 EVER = 99_999
 
@@ -47,7 +47,7 @@ def test_every_property_has_a_bug_and_a_place() -> None:
 
 @pytest.mark.parametrize("bug", BUGS, ids=[bug.property for bug in BUGS])
 def test_a_seeded_bug_is_caught_by_its_property(bug: Bug, tmp_path: Path) -> None:
-    assert run(replace(bug.episode, executor="c")).findings == ()  # which gives what Python gives
+    assert played(replace(bug.episode, executor="c"))[1].findings == ()  # which gives what Python gives
     _, found = findings(bug, tmp_path)
     assert bug.property in {finding.property for finding in found}, found
 
@@ -127,8 +127,8 @@ def test_a_fault_changes_which_lines_match_and_ends_as_it_should(name: str) -> N
     assert fault_classes(episode) == (name,)
     parts = (ASIDE,) if name == "two parts" else TBOX
     usual = Episode(episode.backend, rows=episode.rows, parts=parts, seed=episode.seed, step_s=episode.step_s)
-    assert trace(episode) != trace(usual)
-    outcome = run(episode)
+    traced, outcome = played(episode)
+    assert traced != played(usual)[0]
     assert (outcome.end, outcome.findings) == (end, ())
 
 

@@ -88,12 +88,9 @@ def test_what_does_not_resolve_is_no_fault() -> None:
     assert resolves(gripper("a line dropped", "| 7    | false       | f_state", ""))
 
 
-def test_a_missing_line_is_caught_by_the_table_s_proof_and_by_the_composed_one(
-    sound: Mapping[str, Standing],
-) -> None:
+def test_a_missing_line_is_caught_by_the_table_s_proof() -> None:
     fault = gripper("a line dropped", "| 7    | false       | f_state", "")
     assert by_check(fault) == Answer(True, "RCS401")
-    assert by_compose(fault, sound) == Answer(True, "gripper: position: some line matches")
 
 
 def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(
@@ -114,15 +111,6 @@ def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(
     )
     assert by_check(fault) == Answer(False)
     assert by_compose(fault, sound).how.startswith("gripper: a command number is taken up once")
-
-
-def test_only_the_composed_proof_knows_that_two_lines_never_meet(sound: Mapping[str, Standing]) -> None:
-    """`waited` is zero where a command is new: the table alone cannot know it."""
-    fault = gripper(
-        "a line widened", "| 5    | false       | moving    | false      | not", "| 5    | | moving"
-    )
-    assert by_check(fault).caught
-    assert not by_compose(fault, sound).caught
 
 
 def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(

@@ -1,11 +1,13 @@
 """What tests of the loop share: which lines ran in which cycle, and counterexamples that are kept."""
 
+from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc_cell.episodes.episode import SYSTEM, Episode, PartSpec, script
 from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import CycleState
 
 KEPT = Path(__file__).parents[2] / ".rcsc-cache" / "loop"
@@ -27,13 +29,14 @@ class Trace:
         return None
 
 
-def trace(episode: Episode, system: Path = SYSTEM) -> list[tuple[str, ...]]:
-    """The lines of every cycle, level by level."""
-    loop = Loop(episode, system, properties=(Trace,))
-    loop.finish()
-    [made] = loop.properties
+@cache
+def played(episode: Episode) -> tuple[list[tuple[str, ...]], EpisodeOutcome]:
+    """The lines of every cycle, level by level, and what became of the episode."""
+    loop = Loop(episode, SYSTEM, properties=(*PROPERTIES, Trace))
+    outcome = loop.finish()
+    made = loop.properties[-1]
     assert isinstance(made, Trace)
-    return made.ran
+    return made.ran, outcome
 
 
 def keep(episode: Episode, outcome: EpisodeOutcome) -> str:
