@@ -343,6 +343,23 @@ class TestFalseClaims:
         trusted = replace(claim, trusts=(Trusted(*trust_of(trust), trust),))
         assert broken(its, only(trusted), iter((episode,))) == set()
 
+    def test_a_state_table_error_says_what_the_episode_broke_before(self, tmp_path: Path) -> None:
+        text = edited(
+            SAFE["lv.rcs"],
+            ("table t {", "assume small : x <= 4\ntable t assuming small {"),
+            ("| > 0 ||", "| 1 .. 4 ||"),
+        )
+        path = written(tmp_path, {**SAFE, "lv.rcs": text})
+        its, claims = stand(path), proved_claims_of(path)
+        episode = Episode(executor="python", readings=(Reading("out.x", 7, 0, 3),), ticks=12)
+        said = "level `lv`, table `t`: no line matches"
+        assert [one.message for one in Loop(episode, its).finish().findings] == [said]
+        [finding] = Loop(episode, its, claims).finish().findings
+        assert finding.message == (
+            f"{said}; the episode has broken what its proof takes for granted: assumption `small` of level `lv`, "
+            "as it is declared (level `lv`: `small` does not hold)"
+        )
+
     def test_one_that_trusts_what_nobody_knows_is_told(self, safe: Stand) -> None:
         strange = Trusted(*trust_of("the moon is full"), "the moon is full")
         of_ = watched(only(Claim("lv", "SAFE", "", "", "values", (strange,))), safe)

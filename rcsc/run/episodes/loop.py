@@ -17,6 +17,7 @@ from rcsc.run.episodes.operator import WAITING, EpisodeOperator, operator, value
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
 from rcsc.run.episodes.properties import ENDS, NO_ERROR, properties, was_refused
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
+from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Field, Stand, stand
 from rcsc.run.episodes.subordinates import subordinates
 from rcsc.run.faults import faults_of, switch
@@ -341,9 +342,8 @@ class Loop:
                 self._seen.staged.update((level.name, table, line) for table, line in before)
         cycle.tick, cycle.ran = system.tick, ran
         self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
-        for watcher in self.watching:
-            for broken in watcher.watch(cycle):
-                self._find(broken, system.tick)
+        for broken in [broken for watcher in self.watching for broken in watcher.watch(cycle)]:
+            self._find(broken, system.tick)
         for level in ran:
             cycle.left[level.name] = level.values
             if level.fault in (0, STOPPED):
@@ -361,8 +361,16 @@ class Loop:
                 return f"`{reading.field}` is {reading.value}"
         return f"buffer `{buffer}`"
 
+    def _untrusted(self, level: str) -> str:
+        """Return what the episode has broken of what was taken for granted where a level was proved; "" for nothing."""
+        proved = (watcher for watcher in self.watching if isinstance(watcher, ProvedHolds))
+        return next((fact for watcher in proved for fact in watcher.untrusted(level)), "")
+
     def _find(self, broken: Broken, tick: int) -> None:
-        name, message = broken.property, broken.message[:MOST_MESSAGE]
+        name, message = broken.property, broken.message
+        if name == NO_ERROR and (fact := self._untrusted(broken.level)):
+            message = f"{message}; the episode has broken what its proof takes for granted: {fact}"
+        message = message[:MOST_MESSAGE]
         if broken.property.endswith(ENDS):
             self._end = "hang"
             if not self._stage.outside:

@@ -77,6 +77,13 @@ class ProvedHolds:
                 if not any(trust in self._trusts.broken for trust in claim.trusts):
                     yield Broken(f"{name}: {PROVED}: {claim.words}", wrong, name, proved=True)
 
+    def untrusted(self, level: str) -> Iterator[str]:
+        """Yield what was broken so far of what claims about a level take for granted."""
+        claims = [claim for claim, _ in self._checks.get(level, ())]
+        for trusted in dict.fromkeys(trust for claim in claims for trust in claim.trusts):
+            if trusted in self._trusts.broken:
+                yield f"{trusted.words} ({self._trusts.broken[trusted]})"
+
     def _now(self, cycle: Cycle, level: RunningLevel) -> Now:
         name, values = level.name, level.values
         before = self._before.get(name) or cycle.before[name]
