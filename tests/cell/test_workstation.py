@@ -45,6 +45,14 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The database of the shipped data; only to be read, or copied."""
+    path = tmp_path_factory.mktemp("built") / "cell.sqlite"
+    build(SYSTEM.parent / "cell.toml", path, PARTS)
+    return path
+
+
 # --- data ---
 
 WRONG_DATA = {
@@ -130,14 +138,16 @@ FOREIGN = {
 
 @pytest.mark.parametrize("what", list(FOREIGN))
 def test_a_database_of_somebody_else_is_read_as_what_it_must_be(
-    what: str, project: Path, capfd: pytest.CaptureFixture[str]
+    what: str, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    build(project / "tables/cell.toml", project / "a?b%.sqlite", PARTS)
-    held = sqlite3.connect(project / "a?b%.sqlite")
-    assert run(["db", "show", "stations", "--database", "a?b%.sqlite"]) == 0
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(built, "a?b%.sqlite")
+    held = sqlite3.connect(tmp_path / "a?b%.sqlite")
+    assert run(["db", "show", "stations", "--system", str(SYSTEM), "--database", "a?b%.sqlite"]) == 0
     held.executescript(FOREIGN[what])
     held.close()
-    for command in (["db", "show", "locations"], ["run", "make_boxt", *QUICK]):
+    at = ["--system", str(SYSTEM)]
+    for command in (["db", "show", "locations", *at], ["run", "make_boxt", *QUICK, *at]):
         capfd.readouterr()
         assert run([*command, "--database", "a?b%.sqlite"]) == 1
         said = capfd.readouterr()
@@ -146,8 +156,8 @@ def test_a_database_of_somebody_else_is_read_as_what_it_must_be(
         assert (error.isprintable(), said.out) == (True, "")
 
 
-def test_a_long_text_is_shown_short(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    build(project / "tables/cell.toml", project / "my.sqlite", PARTS)
+def test_a_long_text_is_shown_short(built: Path, project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(built, project / "my.sqlite")
     held = sqlite3.connect(project / "my.sqlite")
     held.executescript(
         "update objects set name = replace(hex(zeroblob(5000)), '0', 'long' || char(9)) where number = 1"
@@ -161,9 +171,9 @@ def test_a_long_text_is_shown_short(project: Path, capfd: pytest.CaptureFixture[
 
 
 def test_a_table_is_shown_with_names_and_units_and_no_digits_that_say_nothing(
-    project: Path, capfd: pytest.CaptureFixture[str]
+    built: Path, project: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    build(project / "tables/cell.toml", project / "my.sqlite", PARTS)
+    shutil.copy(built, project / "my.sqlite")
     held = tables_of(project / "my.sqlite")
     assert run(["db", "show", "--database", "my.sqlite"]) == 0
     assert {line.split()[0] for line in capfd.readouterr().out.splitlines()} == set(held)
@@ -185,10 +195,8 @@ def test_a_table_is_shown_with_names_and_units_and_no_digits_that_say_nothing(
         assert not re.search(r"\.\d{5}|\d{2,}\.\d{3}|-0 |None|[{}]", "\n".join(rows))
 
 
-def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Path) -> None:
-    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
-    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
-    held = open_database(tmp_path / "cell.sqlite")
+def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(built: Path) -> None:
+    held = open_database(built)
     station, safe = held.locations["STATION"], held.locations["WS-SAFE"]
     grasps = {int(held.route(station, sector)[-1]) for sector in range(4)}
     assert len({held.point(point)[1:3] for point in grasps}) == 4
@@ -196,11 +204,9 @@ def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Pat
     assert held.route(safe, 3) == held.route(safe, 0)
 
 
-def test_a_path_goes_by_both_its_ends(tmp_path: Path) -> None:
+def test_a_path_goes_by_both_its_ends(built: Path) -> None:
     """Section 4.3: by the pair if it has one, else the departure of the one and the approach of the other."""
-    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
-    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
-    held = open_database(tmp_path / "cell.sqlite")
+    held = open_database(built)
     station, block, fixture = (held.locations[name] for name in ("STATION", "V-BLK2", "FIX-MAC5"))
     for sector in range(4):
         there = held.route(station, sector)
@@ -216,11 +222,9 @@ def test_a_path_goes_by_both_its_ends(tmp_path: Path) -> None:
     assert held.path(0, 0, fixture, 0) == (True, 0, 0, *held.route(fixture, 0)[3:5])
 
 
-def test_a_robot_that_is_there_goes_straight_to_it(tmp_path: Path) -> None:
+def test_a_robot_that_is_there_goes_straight_to_it(built: Path) -> None:
     """But not where vision finds the part: there it may stand beside the location."""
-    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
-    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
-    held = open_database(tmp_path / "cell.sqlite")
+    held = open_database(built)
     station, fixture, buffer = (held.locations[name] for name in ("STATION", "FIX-MAC5", "BUFFER"))
     _, leaves, many, first, count = held.path(fixture, 0, fixture, 3)
     assert (leaves, many, count) == (0, 0, 1)
@@ -324,10 +328,9 @@ def test_what_db_build_made_need_not_be_looked_at_again(looks: list[Database]) -
     assert [run(["db", "check"]), len(looks)] == [0, 2]  # who asks for it gets it
 
 
-def test_what_was_gripped_with_any_grasp_can_be_let_go_of(tmp_path: Path) -> None:
+def test_what_was_gripped_with_any_grasp_can_be_let_go_of(built: Path) -> None:
     """TASK remembers an unknown object by the number of the grasp that was tried."""
-    build(SYSTEM.parent / "cell.toml", tmp_path / "cell.sqlite", PARTS)
-    held = open_database(tmp_path / "cell.sqlite")
+    held = open_database(built)
     unknown = held.objects["unknown_object"]
     tried = {grasp for part in held.objects.values() for grasp in range(10) if held.fingers(part, grasp)[0]}
     assert tried == {0, 2, 3}

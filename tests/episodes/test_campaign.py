@@ -94,11 +94,6 @@ def test_records_do_not_depend_on_the_crew(workers: int, tmp_path: Path) -> None
         assert played(CALM, 150, pool, tmp_path / "j") == alone(CALM, 150)
 
 
-def test_processes_play_as_threads_do(tmp_path: Path) -> None:
-    with processes(2) as pool:
-        assert played(CALM, 100, pool, tmp_path / "j") == alone(CALM, 100)
-
-
 def test_a_cluster_plays_as_threads_do(tmp_path: Path) -> None:
     from distributed import Client, LocalCluster
 
@@ -725,25 +720,6 @@ def test_a_short_campaign_of_the_cell_has_no_findings_and_goes_on(tmp_path: Path
         key: once[key] for key in once if "second" not in key and key != "played_now"
     }
     assert set(once["outcomes_by_fault"]) <= {"nominal", *FAULTS}
-
-
-def test_findings_are_saved_and_told_and_the_status_is_1(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("rcsc_cell.episodes.kind.CELL", CALM.kind)
-    args = ["campaign", "--system", str(SYSTEM), "--no-compile", "--workers", "1", "--episodes", "30"]
-    args += ["--journal", str(tmp_path / "j"), "--save", str(tmp_path / "c"), "--seed", "5"]
-    assert cli.run(args) == 1
-    err = capsys.readouterr().err
-    assert f"`{fake.HELD}` does not hold: it fell" in err
-    places = sorted((tmp_path / "c").iterdir())
-    assert len(places) == err.count("error[RCS743]") > 0
-    assert all(f"rcsc campaign --system {SYSTEM} --again {place}\n" in err for place in places)
-    assert [fault.name for fault in saved_episode(places[0], PLAIN).faults] == [fake.BREAKS]
-    assert cli.run(args) == 1
-    assert "RCS743" not in capsys.readouterr().err  # saved before
-    assert cli.run(["campaign", "--system", str(SYSTEM), "--no-compile", "--again", str(places[0])]) == 1
-    assert f"error[RCS743]: {places[0]}, cycle " in capsys.readouterr().err
 
 
 def test_again_says_what_became_of_a_saved_episode(

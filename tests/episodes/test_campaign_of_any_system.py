@@ -10,9 +10,7 @@ import pytest
 from rcsc.front import commands
 from rcsc.run.campaign.any_system import ANY
 from rcsc.run.campaign.counterexamples import BadEpisode, again, saved_episode
-from rcsc.run.campaign.journal import Journal, header
 from rcsc.run.campaign.rig import EpisodeKind, Rig, digest
-from rcsc.run.campaign.runner import campaign
 from rcsc.run.campaign.shrink import shrink
 from rcsc.run.campaign.work import NotDrawn, _OutOfTime, play, within
 from rcsc.run.campaign.worker_pool import processes
@@ -162,23 +160,6 @@ def test_a_campaign_ends_where_the_plant_is_not_in_order(
     (dock / "base.py").write_text(WILD + "\n    def __init__(self) -> None:\n        time.sleep(900)\n")
     with pytest.raises(NotDrawn, match=r"no episode could be drawn within 3 s"):
         play(rig, digest(rig), 0, [0])
-
-
-def test_a_campaign_of_any_system_goes_on_after_a_kill(dock: Path, tmp_path: Path) -> None:
-    """Its journal has what was played, with any number of workers; what is left is played, and nothing twice."""
-    rig = Rig(ANY, dock / "system.toml", executor="python")
-    expected = play(rig, digest(rig), 3, range(4))
-    with Journal(tmp_path / "j", header(rig, 3)) as journal:
-        journal.add(expected[:2])
-    text = (tmp_path / "j").read_bytes()
-    (tmp_path / "j").write_bytes(text + text.splitlines(keepends=True)[1][:20])  # cut off in the third record
-    with processes(2) as pool, Journal(tmp_path / "j", header(rig, 3)) as journal:
-        new = [record.index for records in campaign(rig, 3, 4, pool, journal) for record in records]
-        assert sorted(new) == [2, 3]
-        assert [journal.records[at] for at in range(4)] == list(expected)
-    compiled = replace(rig, executor="c")
-    digests = [record.digest for record in play(compiled, digest(compiled), 3, range(4))]
-    assert digests == [record.digest for record in expected]
 
 
 def test_the_digest_covers_tables_scripts_and_the_files_of_the_plant_that_is_meant(dock: Path) -> None:
