@@ -535,7 +535,7 @@ class TestTheSearch:
 
     def test_leaves_of_what_is_found_one_order_and_one_restart(self, dock: Path) -> None:
         its = stand(changed(dock, "drive.rcs", (" restart bad", "")))
-        searched = search(its, 60)
+        searched = search(its, 60, kinds=("c",))
         assert searched.falsified is not None
         episode, finding = searched.falsified
         assert finding.property == "drive: failed stays failed"

@@ -706,13 +706,13 @@ def _campaign(tmp_path: Path, *args: str) -> Result:
 
 def test_a_short_campaign_of_the_cell_has_no_findings_and_goes_on(tmp_path: Path) -> None:
     said = tmp_path / "s.json"
-    first = _campaign(tmp_path, "--episodes", "20", "--json", str(said))
+    first = _campaign(tmp_path, "--episodes", "8", "--json", str(said))
     assert first.return_value == 0, first.output
-    assert " 20 played now" in first.output
+    assert " 8 played now" in first.output
     once = json.loads(said.read_text())
-    assert (once["episodes"], once["findings"], once["played_now"]) == (20, [], 20)
+    assert (once["episodes"], once["findings"], once["played_now"]) == (8, [], 8)
     assert not (tmp_path / "c").exists()
-    more = _campaign(tmp_path, "--episodes", "20", "--json", str(said))
+    more = _campaign(tmp_path, "--episodes", "8", "--json", str(said))
     assert more.return_value == 0
     assert " 0 played now" in more.output
     twice = json.loads(said.read_text())

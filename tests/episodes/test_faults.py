@@ -113,18 +113,6 @@ def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(
     assert by_compose(fault, sound).how.startswith("gripper: a command number is taken up once")
 
 
-def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(
-    sound: Mapping[str, Standing],
-) -> None:
-    fault = gripper("a counter not incremented", "waited + 1", "waited + 0")
-    assert by_check(fault) == Answer(False)
-    caught = by_compose(fault, sound)
-    assert caught.caught
-    assert "gripper: grasp: the command ends" in caught.how
-    assert "gripper: position: line 5 is reached" in caught.how
-    assert by_campaign(fault) == Answer(True, "episode 3: task: every command ends")
-
-
 def test_only_the_episodes_know_what_the_fingers_do(sound: Mapping[str, Standing]) -> None:
     """They are told to move, and not where to."""
     fault = gripper("an assignment dropped", "to_hand.opening_mm := primitive.opening_mm", "")

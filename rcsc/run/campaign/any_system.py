@@ -52,7 +52,7 @@ def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
 
 
 def _plant(spec: PlantSpec) -> Iterator[Path]:
-    """The files of the user's that a plant is made of: with a file in Python those beside it, which it may import."""
+    """Yield the files of the user's that a plant is made of: with a file in Python those beside it, which it may import."""
     file = spec.python.partition(":")[0]
     if spec.model is not None:
         yield spec.model
@@ -62,7 +62,7 @@ def _plant(spec: PlantSpec) -> Iterator[Path]:
 
 
 def _module(spec: PlantSpec) -> Iterator[NamedFile]:
-    """The installed module that a plant is, wherever it is installed."""
+    """Yield the installed module that a plant is, wherever it is installed."""
     name = spec.python.partition(":")[0]
     with contextlib.suppress(ModuleNotFoundError, ValueError):  # which is told when the plant is loaded
         found = None if not name or name.endswith(".py") else importlib.util.find_spec(name)
@@ -71,14 +71,14 @@ def _module(spec: PlantSpec) -> Iterator[NamedFile]:
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    """Every file below a folder, but for hidden ones."""
+    """Yield every file below a folder, but for hidden ones."""
     for name, folders, files in os.walk(folder):
         folders[:] = sorted(below for below in folders if not below.startswith("."))
         yield from (Path(name, file) for file in sorted(files) if not file.startswith("."))
 
 
 def _admit(episode: Episode, system: Path, plant: str) -> Episode:
-    """A saved episode as it is to run here: a file's name in it is no leave to import that file.
+    """Return a saved episode as it is to run here: a file's name in it is no leave to import that file.
 
     Raises:
         ValueError: It names what the system has not.

@@ -15,7 +15,7 @@ from rcsc.run.plant.load import by_hand, chosen, named
 
 
 def plant_of(system: Description, wanted: str | None) -> PlantSpec | None:
-    """The plant that is meant: by its name or file, else the one that is taken by hand, else the first; None without any.
+    """Return the plant to play with: by its name or file, else the one that is taken by hand, else the first; None without any.
 
     Raises:
         BadPlant: The description has none of that name.
@@ -24,7 +24,7 @@ def plant_of(system: Description, wanted: str | None) -> PlantSpec | None:
 
 
 def plant_name(spec: PlantSpec | None) -> str:
-    """A plant as a worker in any folder finds it; empty where there is none, or for `[plant]` itself."""
+    """Return a plant as a worker in any folder finds it; empty where there is none, or for `[plant]` itself."""
     if spec is None or spec.path:
         return "" if spec is None else spec.name
     file, colon, of = spec.python.partition(":")
@@ -32,7 +32,7 @@ def plant_name(spec: PlantSpec | None) -> str:
 
 
 def kind_of(system: Description, spec: PlantSpec | None) -> EpisodeKind[Any]:
-    """The kind of its episodes.
+    """Return the kind of its episodes.
 
     Raises:
         BadPlant: What the description names is none.

@@ -56,7 +56,7 @@ class Choice:
 
 
 def folder_word(property_: str) -> str:
-    """A property as a part of a folder's name."""
+    """Return a property as a part of a folder's name."""
     return re.sub("[^a-z0-9]+", "-", property_.lower()).strip("-")[:MOST_CHARACTERS]
 
 
@@ -176,7 +176,7 @@ def _origin(rig: Rig[Any], seed: int, choice: Choice) -> dict[str, Any]:
 
 
 def saved_episode(path: Path, rig: Rig[E]) -> E:
-    """The episode in a file, or in a counterexample's folder, if it is one of this system.
+    """Return the episode in a file, or in a counterexample's folder, if it is one of this system.
 
     Raises:
         BadEpisode: There is none.

@@ -101,7 +101,7 @@ class Journal:
     """
 
     def __init__(self, path: Path, head: dict[str, Any]) -> None:
-        """Opens or begins it.
+        """Open the journal, or begin it.
 
         Raises:
             BadJournal: It is another campaign's, damaged, or being written.
@@ -137,7 +137,7 @@ class Journal:
             self._file.flush()
 
     def add(self, records: Iterable[EpisodeRecord]) -> None:
-        """Writes records; when it returns, a kill of this process loses none of them.
+        """Write records; when it returns, a kill of this process loses none of them.
 
         Raises:
             OSError: They cannot be written.
@@ -148,7 +148,7 @@ class Journal:
         self._file.flush()
 
     def close(self) -> None:
-        """Lets others have it."""
+        """Close the journal, which others may write from then on."""
         self._file.close()
 
     def __enter__(self) -> Self:
@@ -159,7 +159,7 @@ class Journal:
 
 
 def _opened(path: Path) -> BinaryIO:
-    """The file, open for reading and writing; it is made where there is none."""
+    """Return the file, open for reading and writing; it is made where there is none."""
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK, 0o666)
     kind = os.fstat(handle)
     if not stat.S_ISREG(kind.st_mode) or kind.st_size > MOST_BYTES:

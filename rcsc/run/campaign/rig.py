@@ -52,7 +52,7 @@ E = TypeVar("E", bound=EpisodeValue)
 
 
 def usual_chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a kind may look at both
-    """Episodes that a worker is given at once."""
+    """Return how many episodes a worker is given at once."""
     return 10
 
 
@@ -120,19 +120,19 @@ class Rig(Generic[E]):
         return self.kind.run(episode, self.system, log, self.claims)
 
     def episode(self, seed: int, index: int) -> E:
-        """Episode `index` of the campaign of `seed`."""
+        """Return episode `index` of the campaign of `seed`."""
         drawn = self.kind.draw(episode_seed(seed, index), self.system, self.plant, self.script)
         return replace(drawn, executor=self.executor)
 
 
 def episode_seed(seed: int, index: int) -> int:
-    """The seed of an episode, of 63 bits: campaigns of neighbouring seeds have no episodes in common."""
+    """Return the seed of an episode, of 63 bits: campaigns of neighbouring seeds have no episodes in common."""
     return int.from_bytes(hashlib.sha256(f"{seed} {index}".encode()).digest()[:8]) >> 1
 
 
 @cache
 def known_lines(system: Path) -> tuple[LineName, ...]:
-    """Every line of every table that a level of the system may run, in the tables' order.
+    """Return every line of every table that a level of the system may run, in the tables' order.
 
     Raises:
         BadDescription: The system is not in order.
@@ -151,7 +151,7 @@ def _places(system: Path) -> dict[LineName, int]:
 
 
 def mask(lines: Iterable[LineName], system: Path) -> int:
-    """Lines as bits, the first of `known_lines` the lowest; a cycle that ran no line, being refused, has no bit."""
+    """Return lines as bits, the first of `known_lines` the lowest; a cycle that ran no line, being refused, has no bit."""
     places = _places(system)
     return sum({1 << places[line] for line in lines if line in places})
 
@@ -176,7 +176,7 @@ def digest(rig: Rig[Any]) -> str:
 
 
 def programs(described: Description, system: Path) -> list[Path]:
-    """The sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
+    """Return the sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
     roots = (
         place for level in described.levels for place in places(system, level.program) if place.is_file()
     )
@@ -184,13 +184,13 @@ def programs(described: Description, system: Path) -> list[Path]:
 
 
 def run_sources() -> list[NamedFile]:
-    """Every module that has a part in an episode of any system, in its run and in what watches it."""
+    """Return every module that has a part in an episode of any system, in its run and in what watches it."""
     package = Path(__file__).parents[2]
     return [module for room in _ROOMS for module in sources(package / room, "log", "link", "campaign")]
 
 
 def sources(folder: Path, *lookers: str) -> list[NamedFile]:
-    """Every module below a folder, but for those of rooms that only look on and change no outcome."""
+    """Return every module below a folder, but for those of rooms that only look on and change no outcome."""
     return [
         (path.relative_to(folder.parent).as_posix(), path)
         for path in sorted(folder.rglob("*.py"))

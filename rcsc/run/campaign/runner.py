@@ -78,7 +78,7 @@ class _Round:
         return bool(self._waiting or self._suspects or self.flying)
 
     def step(self, poll_s: float) -> Records:
-        """Hands out, waits for at most so long, and takes what is done."""
+        """Hand tasks out, wait for at most so long, and take the finished ones."""
         self._submit()
         done, _ = wait(self.flying, timeout=poll_s, return_when=FIRST_COMPLETED)
         return tuple(record for future in done for record in self._taken(future))
@@ -113,7 +113,7 @@ class _Round:
         return ()
 
     def _guilty(self, index: int) -> EpisodeRecord:
-        """The record of an episode that a worker died of."""
+        """Return the record of an episode that a worker died of."""
         outcome = death(self._rig, time.monotonic() - self._since_s)
         rig = self._rig
         faults = rig.kind.fault_classes(rig.episode(self._seed, index), rig.system)

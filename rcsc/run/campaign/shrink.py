@@ -3,6 +3,10 @@
 In: an episode and what it means to fail. Out: an episode that fails, from which nothing that was tried can be left out. Lists lose
 elements, larger runs of them first; then numbers move toward what is usual: a field's default, a window of one tick.
 
+It stands beside Hypothesis, which shrinks what it drew and not an episode: of the docking robot whose drive forgets that it began anew,
+an episode of eight orders and faults becomes one of two in 23 runs here, stays at eight in 34 where Hypothesis draws its seed, and
+comes to five in 65 where it draws choice by choice.
+
 Source: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input (2002), for removing by halves.
 """
 
@@ -80,7 +84,7 @@ def _round(search: _Search[E]) -> None:
 
 
 def _remove(search: _Search[E], name: str) -> None:
-    """Leaves out runs of elements: all of them, halves, quarters, down to single ones."""
+    """Leave out runs of elements: all of them, halves, quarters, down to single ones."""
     size = len(getattr(search.best, name))
     while size:
         at = 0
@@ -104,7 +108,7 @@ def _plainer(search: _Search[E], name: str) -> None:
 
 
 def _simplify(search: _Search[E], name: str, at: int) -> None:
-    """Moves the numbers of one element."""
+    """Move the numbers of one element."""
     held = getattr(search.best, name)
     if is_dataclass(held[at]):
         _numbers(search, held[at], lambda element: _placed(search.best, name, at, element))

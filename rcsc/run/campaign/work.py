@@ -67,7 +67,7 @@ class Shrunk(Generic[E]):
 
 
 def play(rig: Rig[Any], wanted: str, seed: int, indices: Sequence[int]) -> tuple[EpisodeRecord, ...]:
-    """Plays episodes of a campaign, one after the other.
+    """Play episodes of a campaign, one after the other.
 
     Args:
         rig: On what.
@@ -90,7 +90,7 @@ def _same(rig: Rig[Any], wanted: str) -> None:
 
 
 def _drawn(rig: Rig[E], seed: int, index: int) -> E:
-    """An episode of a campaign.
+    """Return an episode of a campaign.
 
     Raises:
         NotDrawn: A plant that is asked for its faults does not come back.
@@ -110,7 +110,7 @@ def _record(rig: Rig[E], index: int, episode: E) -> EpisodeRecord:
 
 
 def attempt(rig: Rig[E], episode: E, log: Path | None = None) -> EpisodeOutcome:
-    """Runs an episode; what it raises, and that it does not end, are findings.
+    """Run an episode; what it raises, and that it does not end, are findings.
 
     Raises:
         CodedError: The system is not in order; that is no episode's doing.
@@ -177,7 +177,7 @@ def counterexample(episode: E, outcome: EpisodeOutcome, name: str, log: Path) ->
 
 
 def dated(finding: EpisodeFinding, log: Path) -> EpisodeFinding:
-    """The finding in the cycle in which its log ends, where only a campaign saw that the run ended there."""
+    """Return the finding in the cycle in which its log ends, where only a campaign saw that the run ended there."""
     if finding.property not in ODD or not log.is_file():
         return finding
     from rcsc.run.log.read import UnreadableLog, read  # of an extra
@@ -200,7 +200,7 @@ GRACE = 2.0
 
 
 def own_process() -> None:
-    """Marks this process as a campaign's worker, which may be ended."""
+    """Mark this process as a campaign's worker, which may be ended."""
     _OWN.set()
 
 

@@ -51,7 +51,7 @@ class WorkerPool:
     renew: Callable[[], Executor] | None = None
 
     def submit(self, task: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Future[R]:
-        """A task, for any worker.
+        """Submit a task, for any worker.
 
         Raises:
             WorkersGone: The executor takes none, and cannot be made anew.
@@ -113,7 +113,7 @@ def processes(workers: int) -> Iterator[WorkerPool]:
 
 @contextlib.contextmanager
 def cluster(address: str) -> Iterator[WorkerPool]:
-    """The workers of a `dask.distributed` scheduler.
+    """Yield the workers of a `dask.distributed` scheduler.
 
     Raises:
         ModuleNotFoundError: distributed is not installed.
@@ -130,7 +130,7 @@ def cluster(address: str) -> Iterator[WorkerPool]:
 
 
 def pool_of(client: "Client") -> WorkerPool:
-    """The workers that a client sees now."""
+    """Return the workers that a client sees now."""
     from distributed.scheduler import KilledWorker
 
     threads: dict[str, Any] = client.nthreads()

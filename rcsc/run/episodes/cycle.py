@@ -65,5 +65,5 @@ class Property(Protocol):
     """Something that is to hold in every cycle of a run; made for one run."""
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """What does not hold in this cycle."""
+        """Yield each violation of this cycle."""
         ...

@@ -134,7 +134,7 @@ class Episode:
     ticks: int = 0
 
     def __post_init__(self) -> None:
-        """Refuses what no episode can be."""
+        """Refuse what no episode can be."""
         words = ((self.executor, get_args(Kind)), *((harm.kind, get_args(Harm)) for harm in self.harms))
         for word, known in words:
             if word not in known:
@@ -182,7 +182,7 @@ class Episode:
         return episode
 
     def told(self) -> tuple[str, ...]:
-        """What happens in it, in words, a line each."""
+        """Return the events of the episode in words, a line each."""
         return (
             *(
                 _order_told(order, first=all(order.level != before.level for before in self.orders[:at]))
@@ -233,7 +233,7 @@ _ELEMENTS: dict[str, type] = {
 
 
 def _filled(kind: type, element: object) -> object:
-    """An element of a list as it was read, with the defaults of what it does not say."""
+    """Return an element of a list as it was read, with the defaults of what it does not say."""
     usual = {field.name: plain(field.default) for field in fields(kind) if field.default is not MISSING}
     return {**usual, **element} if isinstance(element, dict) else element
 
@@ -266,7 +266,7 @@ def _order_told(order: OrderSpec, *, first: bool) -> str:
 
 
 def _in_file(value: Setting) -> Setting:
-    """A value as a file's writer takes it: numbers as they are, for a text that begins with a sign would be a formula."""
+    """Return a value as a file's writer takes it: numbers as they are, for a text that begins with a sign would be a formula."""
     return _cell(value) if isinstance(value, bool | str) else value
 
 

@@ -68,7 +68,7 @@ class Explanations:
                 yield target, source
 
     def because(self, broken: Broken) -> str:
-        """The fault that explains it; empty for none."""
+        """Return the fault that explains it; empty for none."""
         if broken.proved:
             return self.repeated.get(broken.level, "")
         if not broken.level:
@@ -88,7 +88,7 @@ class Explanations:
 
 
 def follows(program: Program, leaf: str) -> set[str]:
-    """The leaf, and all leaves that are assigned what was computed from it."""
+    """Return the leaf, and all leaves that are assigned what was computed from it."""
     flows = list(_flows(program))
     known, size = {leaf}, 0
     while len(known) > size:

@@ -89,7 +89,7 @@ class HarmedMemory(CommonMemory):
             self.changed[name] = places
 
     def publish(self, name: str, values: Values) -> None:
-        """Makes this the latest value, unless something happens to it."""
+        """Make this the latest value, unless something happens to it."""
         self.said[name] = values
         if name in self._past:
             self._past[name].append(values)

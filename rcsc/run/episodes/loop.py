@@ -41,7 +41,7 @@ RESTARTS = "starts anew"
 def run(
     episode: Episode, system: str | Path, log: Path | None = None, claims: Claims = NOTHING
 ) -> EpisodeOutcome:
-    """Runs it to its end, with every property watching.
+    """Run an episode to its end, with every property watching.
 
     Args:
         episode: What to run.
@@ -152,7 +152,7 @@ class _Ordered:
     switch: Callable[[int], None]
 
     def step(self, tick: int, _: Latest) -> Mapping[str, Values]:
-        """One tick."""
+        """Run one tick."""
         self.switch(tick)
         return {}
 
@@ -224,7 +224,7 @@ class Loop:
         return tuple(self._seen.findings.values())
 
     def finish(self, log: Path | None = None) -> EpisodeOutcome:
-        """Runs to the end, and keeps every cycle where `log` says where.
+        """Run to the end, and keep every cycle where `log` says where.
 
         Raises:
             OSError: The log cannot be written.
@@ -240,7 +240,7 @@ class Loop:
         return self.outcome()
 
     def step(self) -> None:
-        """One tick."""
+        """Run one tick."""
         tick = self.system.tick
         self._memory.begin(tick)
         self._switch(tick)
@@ -269,7 +269,7 @@ class Loop:
         )
 
     def outcome(self) -> EpisodeOutcome:
-        """What has become of it so far."""
+        """Return the outcome so far."""
         lines = set(self._seen.staged)
         for name, by, at in self._seen.lines:
             sign = self._its.signs[name]
@@ -314,7 +314,7 @@ class Loop:
         self.cycle.before[name] = self.cycle.left[name] = level.values
 
     def _to_refuse(self, tick: int) -> Mapping[str, frozenset[str]]:
-        """Leaves that hold what their level must refuse, by level; of several readings of a field the last holds."""
+        """Return leaves that hold what their level must refuse, by level; of several readings of a field the last holds."""
         held = {
             (one.buffer, one.place): (its_field, one)
             for its_field, one in self._held
@@ -350,7 +350,7 @@ class Loop:
                 cycle.before[level.name] = level.values
 
     def _why(self, buffer: str) -> str:
-        """Which fault changed a buffer, in words."""
+        """Return the fault that changed a buffer, in words."""
         tick = self.system.tick - 1
         for harm in self.episode.harms:
             if (harm.buffer, harm.kind) == (buffer, "stale") and harm.first_tick <= tick <= harm.last_tick:

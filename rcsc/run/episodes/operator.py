@@ -21,7 +21,7 @@ CHANGED, WAITING = "changed", "waiting"
 
 
 def value_of(leaf: Leaf, setting: Setting) -> Value:
-    """The value of a leaf that a word or a number means; a number may lie outside its range, or be no member's.
+    """Return the value of a leaf that a word or a number means; a number may lie outside its range, or be no member's.
 
     Raises:
         ValueError: It is none of the leaf's type.
@@ -40,12 +40,12 @@ def value_of(leaf: Leaf, setting: Setting) -> Value:
 
 
 def setting_of(leaf: Leaf, value: Value) -> Setting:
-    """The word or number that means a value."""
+    """Return the word or number that means a value."""
     return leaf.members[int(value)] if leaf.members and 0 <= value < len(leaf.members) else value
 
 
 def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
-    """A value of a leaf: mostly an edge, else anywhere in its range."""
+    """Return a value of a leaf: mostly an edge, else anywhere in its range."""
     low, high = leaf.low, leaf.high
     if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
         return random.choice(edges)
@@ -55,7 +55,7 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
 
 
 def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:
-    """The fields of an order but its number.
+    """Return the fields of an order but its number.
 
     Raises:
         ValueError: The order has no such field, or a value is none of the field's.
@@ -131,7 +131,7 @@ class OrderLine:
             self.given = Given(number, spec, tick, leaf.members.index(spec.command) == self.served.rest)
 
     def end(self, state: str, reason: str, tick: int) -> RowEnd:
-        """How the order that stands ended."""
+        """Return how the order that stands ended."""
         assert self.given is not None
         return RowEnd(self.given.number, self.given.text, state, reason, tick - self.given.tick)
 
@@ -180,7 +180,7 @@ class EpisodeOperator:
 
 
 def operator(served: Sequence[Served], orders: Sequence[OrderSpec]) -> EpisodeOperator:
-    """Who gives these orders.
+    """Return an operator that gives these orders.
 
     Raises:
         ValueError: An order is to a level that nobody outside orders, or has what the level's orders have not.

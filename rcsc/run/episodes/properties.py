@@ -30,7 +30,7 @@ class NoStateTableError:
     """Exactly one line of each table matches, and no input is refused that lies in its range."""
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Which level met which fault."""
+        """Yield each level that met a fault, with the fault."""
         for level in cycle.ran:
             if level.fault not in (0, STOPPED) and not was_refused(cycle, level):
                 text = f"level `{level.name}`, table `{level.table}`: {level.sign.fault_text(level.values)}"
@@ -46,7 +46,7 @@ class Refuses:
     """A level refuses a value out of range, and nothing but its inputs changes."""
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Which value was taken, or what changed."""
+        """Yield each value that was taken, and each change."""
         for level in cycle.ran:
             leaves = cycle.refused.get(level.name)
             if not leaves:
@@ -59,7 +59,7 @@ class Refuses:
 
 
 def _changed(level: RunningLevel, before: Values) -> str:
-    """A leaf that is no input and has another value now; an output that is safe may have."""
+    """Return a leaf that is no input and has another value now; an output that is safe may have."""
     for leaf, was, now in zip(level.sign.leaves, before, level.values, strict=False):
         if leaf.kind == "state" and was != now:
             return leaf.name
@@ -77,7 +77,7 @@ class AssumptionsHold:
         }
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Which assumptions failed, and on what values."""
+        """Yield the assumptions that failed, with the values."""
         for level in cycle.ran:
             if level.fault in (0, STOPPED):
                 for name in level.sign.failures(level.values):
@@ -103,7 +103,7 @@ class LevelProperty:
     held: list[Value] | None = None
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """The values on which it does not hold; what a refused cycle left of inputs alone breaks nothing."""
+        """Yield the values on which it does not hold; what a refused cycle left of inputs alone breaks nothing."""
         level = cycle.levels[self.level]
         if level not in cycle.ran or level.fault:
             return
@@ -123,7 +123,7 @@ class LevelProperty:
         yield Broken(f"{self.level}: {self.property.name}", text, self.level)
 
     def _wrong(self, values: Values, earlier: Values) -> str | None:
-        """Why it does not hold: blank where it is false, why it is not defined; None where it holds."""
+        """Return why it does not hold: blank where it is false, why it is not defined; None where it holds."""
         snapshot: dict[str, Value] = {name: values[at] for name, at in self.now.items()}
         snapshot |= {name: earlier[at] for name, at in self.before.items()}
         try:
@@ -133,7 +133,7 @@ class LevelProperty:
 
 
 def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
-    """What a cycle left, with the inputs that were taken last: a refused one took none."""
+    """Return what a cycle left, with the inputs that were taken last: a refused one took none."""
     inputs = {at for at, leaf in enumerate(level.sign.leaves) if leaf.kind == "input"}
     return tuple(taken[at] if at in inputs else value for at, value in enumerate(left))
 
@@ -157,7 +157,7 @@ class TakesInTurn:
     echoed: int = 0
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """An answer to what was never ordered, or to what had been answered before."""
+        """Yield an answer to what was never ordered, or to what had been answered before."""
         said, level = cycle.said.get(self.link.order), cycle.levels[self.link.level]
         if said is not None and int(said[self.link.number]) != self.latest:
             self.latest, self.count = int(said[self.link.number]), self.count + 1
@@ -188,7 +188,7 @@ class NumbersOrders:
     last: Values | None = None
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """The field that changed."""
+        """Yield the field that changed."""
         was, now = self.last, cycle.said.get(self.link.order)
         self.last = now
         if was is None or now is None or was[self.link.number] != now[self.link.number]:
@@ -204,7 +204,7 @@ class NumbersOrders:
 
 
 def numbered(stand: Stand, link: Served) -> tuple[int, ...]:
-    """Places of an order's fields that change with its number only: those that its giver does not declare as streams."""
+    """Return places of an order's fields that change with its number only: those that its giver does not declare as streams."""
     roles, record = stand.programs[link.party].roles, link.order.partition(".")[2]
     named = None
     for role in () if roles is None else roles.subordinates:
@@ -238,7 +238,7 @@ class AnswerStays:
     anew: int = 0
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """What it was, and what it became."""
+        """Yield an answer that changed, with both statuses."""
         link, level = self.link, cycle.levels[self.link.level]
         if level.name in cycle.restarted:
             stood = cycle.before[level.name][self.order : self.order + len(link.order_leaves)]
@@ -269,7 +269,7 @@ class Ends:
     known: dict[str, Given] = field(default_factory=dict)
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """That it did not."""
+        """Yield each command that is late."""
         for line in cycle.operator.lines:
             name, given = line.served.level, line.given
             if given is None or line.ended is not None:
@@ -294,7 +294,7 @@ class PlantHolds:
         self._asked: tuple[tuple[BoundPlant, str], ...] | None = None
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Those that are false, or that raise."""
+        """Yield the properties that are false, or raise."""
         if self._asked is None:
             self._asked = tuple((plant, name) for plant in cycle.plants for name in plant.properties)
         for plant, name in self._asked:
@@ -308,7 +308,7 @@ class PlantHolds:
 
 
 def shown(sign: Signature, values: Values, names: tuple[str, ...]) -> str:
-    """Leaves with their values, in words."""
+    """Return leaves with their values, in words."""
     return ", ".join(
         f"`{name}` = {sign.leaves[sign.index[name]].shown(values[sign.index[name]])}"
         for name in names
@@ -317,7 +317,7 @@ def shown(sign: Signature, values: Values, names: tuple[str, ...]) -> str:
 
 
 def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Property]:
-    """Everything that watches an episode of a system.
+    """Return everything that watches an episode of a system.
 
     Args:
         stand: The system.

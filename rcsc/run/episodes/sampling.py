@@ -1,6 +1,7 @@
 """Episodes by seed, leaning on edges: orders from the declared commands and ranges, and what goes wrong from the declared buffers.
 
-In: a seed. Out: an `Episode`. One in five has no fault; the others have one, or several.
+In: a seed. Out: an `Episode`. One in five has no fault; the others have one, or several. It draws from `Random`, as a worker makes episode
+number N of a campaign from N alone; Hypothesis gives the same strategy seeds (`search`).
 """
 
 import math
@@ -57,7 +58,7 @@ Add = Callable[[Random, Stand, Episode], Episode]
 
 
 def draw(seed: int, system: Path, plant: str = "", script: str = "") -> Episode:
-    """The episode of a seed.
+    """Return the episode of a seed.
 
     Args:
         seed: Which.
@@ -72,7 +73,7 @@ def draw(seed: int, system: Path, plant: str = "", script: str = "") -> Episode:
 
 
 def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode:
-    """The episode of a seed, on a stand.
+    """Return the episode of a seed, on a stand.
 
     Raises:
         CodedError: As `draw`.
@@ -126,7 +127,7 @@ def _when(random: Random, often: float) -> tuple[int, bool]:
 
 
 def scripted(its: Stand, script: str, plant: str = "") -> tuple[OrderSpec, ...]:
-    """The orders of a script with their faults; of the description's own, if nobody says which, as far as it is one of orders.
+    """Return the orders of a script with their faults; of the description's own, if nobody says which, as far as it is one of orders.
 
     Raises:
         BadScript: It is not in order.
@@ -175,7 +176,7 @@ def _values(level: Served, order: Sequence[Value]) -> Iterator[tuple[int, bool |
 
 
 def tick(random: Random) -> int:
-    """A tick at which something may be under way; early ones oftener than late ones."""
+    """Return a tick at which something may be under way; early ones oftener than late ones."""
     return random.randint(0, SOON) if random.random() < 0.5 else int(2 ** random.uniform(0, LATEST)) - 1
 
 
@@ -210,7 +211,7 @@ def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
 
 
 def _read(random: Random, field: Field) -> Setting:
-    """A value that the level takes, as it is or at the edge of its range."""
+    """Return a value that the level takes, as it is or at the edge of its range."""
     if field.past and random.random() < PAST:
         return setting_of(field.leaf, random.choice(field.past))
     return setting_of(field.leaf, between(random, field.leaf, field.edges))
@@ -223,7 +224,7 @@ def _refused(random: Random, its: Stand, episode: Episode) -> Episode:
 
 
 def refusable(random: Random, field: Field) -> Setting:
-    """A value that the level refuses; what is no finite number is none at all, for JSON has no other."""
+    """Return a value that the level refuses; what is no finite number is none at all, for JSON has no other."""
     value = random.choice(field.refused)
     if isinstance(value, float) and not math.isfinite(value):
         return NO_NUMBER
@@ -249,7 +250,7 @@ def _held(episode: Episode, reading: Reading) -> Episode:
 
 
 def _kinds(its: Stand, faults: Sequence[str]) -> list[Add]:
-    """What can go wrong here, each as often as it is drawn."""
+    """Return the injections of a system, each as often as it is drawn."""
 
     def switch(random: Random, _: Stand, episode: Episode) -> Episode:
         window = _window(random, (*LASTING, *LONG))
@@ -266,7 +267,7 @@ def _kinds(its: Stand, faults: Sequence[str]) -> list[Add]:
 
 
 def fault_names(system: Path, plant: str = "") -> tuple[str, ...]:
-    """Every class of faults of a system, in the order in which summaries show them.
+    """Return every class of faults of a system, in the order in which summaries show them.
 
     Raises:
         CodedError: The system or its plant is not in order.
@@ -275,7 +276,7 @@ def fault_names(system: Path, plant: str = "") -> tuple[str, ...]:
 
 
 def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ...]:  # noqa: ARG001  # as every kind of episodes has it
-    """The classes of faults that an episode has, each once; none where nothing goes wrong in it."""
+    """Return the classes of faults that an episode has, each once; none where nothing goes wrong in it."""
     has = {
         *(harm.kind for harm in episode.harms),
         *("refused" if reading.refused else "reading" for reading in episode.readings),

@@ -25,7 +25,7 @@ KINDS: tuple[Kind, ...] = ("c", "python")
 
 
 def episodes(system: str | Path, plant: str = "") -> "SearchStrategy[Episode]":
-    """Episodes of a system, for tests of one's own: `@given(episodes("system.toml"))`.
+    """Return episodes of a system, for tests of one's own: `@given(episodes("system.toml"))`.
 
     Args:
         system: The description, compiled.
@@ -35,10 +35,7 @@ def episodes(system: str | Path, plant: str = "") -> "SearchStrategy[Episode]":
 
 
 def _strategy(its: Stand, plant: str) -> "SearchStrategy[Episode]":
-    """Episodes by seeds: drawn choice by choice, Hypothesis would try the same few again and again.
-
-    What fails is made smaller by what an episode consists of (`rcsc.run.campaign.shrink`), not by its seed.
-    """
+    """Return episodes by their seeds; what fails is shrunk by its orders and faults (`rcsc.run.campaign.shrink`), not by its seed."""
     from hypothesis import strategies as st
 
     return st.integers(0, 2**63 - 1).map(lambda seed: draw_on(its, seed, plant))
@@ -113,7 +110,7 @@ def _differs(
 
 
 def disagreement(episode: Episode, its: Stand, first: Kind, second: Kind) -> EpisodeFinding | None:
-    """The first value that differs between two kinds of executors; if one kind alone does not repeat itself, that of the plant."""
+    """Return the first value that differs between two kinds of executors; if one kind alone does not repeat itself, that of the plant."""
     for other, name in ((first, REPEATS), (second, AGREE)):
         one, two = (Loop(replace(episode, executor=kind), its) for kind in (first, other))
         while not (one.over or two.over):
@@ -131,7 +128,7 @@ def disagreement(episode: Episode, its: Stand, first: Kind, second: Kind) -> Epi
 def found_again(
     episode: Episode, its: Stand, name: str, kinds: Sequence[Kind] = KINDS
 ) -> EpisodeFinding | None:
-    """What an episode breaks of a property; None for nothing, and of an episode that is none of the system's."""
+    """Return the finding of a property in an episode; None for nothing, and of an episode that is none of the system's."""
     with contextlib.suppress(ValueError):
         return _found_again(episode, its, name, kinds)
     return None

@@ -102,7 +102,7 @@ class Stand:
 
 
 def stand(path: Path, generated: Path | None = None) -> Stand:
-    """The stand of a description; the same as long as none of its files changes.
+    """Return the stand of a description; the same as long as none of its files changes.
 
     Args:
         path: Of the description.
@@ -115,7 +115,7 @@ def stand(path: Path, generated: Path | None = None) -> Stand:
 
 
 def _files(path: Path, generated: Path | None) -> tuple[tuple[str, int], ...]:
-    """Every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
+    """Return every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
     system = _described(path, path.stat().st_mtime_ns if path.is_file() else 0)
     tried = [place for spec in system.levels for place in places(path, spec.program)]
     folders = dict.fromkeys((path.parent, *(place.parent for place in tried)))
@@ -144,7 +144,7 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
 
 
 def _root(path: Path, program: str) -> str:
-    """The source of a program.
+    """Return the source of a program.
 
     Raises:
         BadDescription: It is not there.
@@ -158,7 +158,7 @@ def _root(path: Path, program: str) -> str:
 
 
 def _program(path: Path, name: str) -> Program:
-    """A resolved program.
+    """Return a resolved program.
 
     Raises:
         BadDescription: Its source is not in order.
@@ -185,7 +185,7 @@ def _fields(
     programs: Mapping[str, Program],
     edges: Mapping[str, Mapping[str, tuple[Value, ...]]],
 ) -> list[Field]:
-    """The fields from outside that are not the protocol's: of an order none, of a report those that a device measures."""
+    """Return the fields from outside that are not the protocol's: of an order none, of a report those that a device measures."""
     level_of = {wire.source: wire.target.partition(".")[0] for wire in system.wires}
     fields = []
     keys = {(spec.name, key) for spec in system.levels for feed in spec.feeds for key in feed.keys}
@@ -228,7 +228,7 @@ _SWITCHES: dict[tuple[tuple[tuple[str, int], ...], str], tuple[str, ...]] = {}
 
 
 def switches(its: Stand, plant: str = "") -> tuple[str, ...]:
-    """The faults that a plant declares, in order.
+    """Return the faults that a plant declares, in order.
 
     Raises:
         CodedError: The plant is not in order.

@@ -62,7 +62,7 @@ class Subordinate:
         return {self.report: self._now} if self._now else {}
 
     def _reported(self, order: Values) -> tuple[Value, ...]:
-        """The report on an order that is under way; what the protocol does not fill may be anything."""
+        """Return the report on an order that is under way; what the protocol does not fill may be anything."""
         drawn = tuple(between(self.random, leaf, edges) for leaf, edges in self.leaves)
         protocol = {
             ECHO: order[self.given[NUMBER]],
@@ -77,7 +77,7 @@ class Subordinate:
 
 
 def subordinates(its: Stand, seed: int) -> tuple[Subordinate, ...]:
-    """Everybody outside to whom a level gives numbered orders, and who reports on them."""
+    """Return everybody outside to whom a level gives numbered orders, and who reports on them."""
     return tuple(_each(its, seed))
 
 
@@ -112,7 +112,7 @@ def _places(leaves: Sequence[Leaf]) -> dict[str, int]:
 
 
 def _statuses(its: Stand, level: str, record: str, status: Leaf) -> tuple[Value, Value, Value]:
-    """The statuses that mean done, failed and under way; where there is none for one of them, that for the one before."""
+    """Return the statuses that mean done, failed and under way; where there is none for one of them, that for the one before."""
     roles = its.programs[level].roles
     role = next((one for one in (() if roles is None else roles.subordinates) if one.order == record), None)
     words = (DONE, FAILED) if role is None else (role.done, role.failed)

@@ -122,7 +122,7 @@ class Episode:
     pushes: tuple[Push, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuses what no episode can be.
+        """Refuse what no episode can be.
 
         Raises:
             ValueError: An unknown backend or fault; a number out of reach; a push with physics; what no system's episode can be.
@@ -145,7 +145,7 @@ class Episode:
             raise ValueError("with physics nothing but a force moves a part")
 
     def in_any_system(self) -> EpisodeOfAnySystem:
-        """What of it any system's episode could have."""
+        """Return the part of it that any system's episode could have."""
         return EpisodeOfAnySystem(
             executor=self.executor, seed=self.seed, harms=self.transport, restarts=self.restarts
         )
@@ -181,5 +181,5 @@ class Episode:
 
 
 def script(rows: Sequence[str]) -> str:
-    """The rows as the text of a script, for `rcsc run`."""
+    """Return the rows as the text of a script, for `rcsc run`."""
     return "\n".join((COLUMNS, *rows)) + "\n"

@@ -22,7 +22,7 @@ _CHUNKS = {"kinematic": 10, "mujoco": 4}
 
 
 def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa: ARG001  # its scripts are drawn, too
-    """The episode of a seed.
+    """Return the episode of a seed.
 
     Raises:
         BadDescription: The plant is not called as one of the cell's.
@@ -36,7 +36,7 @@ def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa
 
 
 def _run(episode: Episode, system: Path, log: Path | None, claims: Claims) -> EpisodeOutcome:
-    """What became of an episode."""
+    """Return the outcome of an episode."""
     from rcsc_cell.episodes.loop import (
         run,  # of an extra, which is asked for by its name before anything is run
     )
@@ -66,7 +66,7 @@ def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # bot
 
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:  # noqa: ARG001  # both plants are of the same
-    """The data, the scripts, the tables that say what is to hold, and the programs around the executors."""
+    """Return the data, the scripts, the tables that say what is to hold, and the programs around the executors."""
     described = description(system)
     tables = [(f"{path.parent.name}/{path.name}", path) for path in programs(described, system)]
     scripts = [(f"scripts/{path.name}", path) for path in sorted(system.parent.glob("scripts/*.csv"))]

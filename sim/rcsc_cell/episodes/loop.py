@@ -94,7 +94,7 @@ class Loop(loop.Loop):
         self._taken = True
 
     def step(self) -> None:
-        """One tick."""
+        """Run one tick."""
         for push in self.in_cell.pushes:
             if push.tick == self.system.tick:
                 self._push(push)
@@ -145,7 +145,7 @@ class Loop(loop.Loop):
     # --- what is seen ---
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """What the cell's properties say of this cycle."""
+        """Yield the violations of the cell's properties."""
         state = self.state
         self._note(cycle.tick - 1)
         state.look()
@@ -205,7 +205,7 @@ class Loop(loop.Loop):
 def run(
     episode: Episode, system: Path = SYSTEM, log: Path | None = None, claims: Claims = NOTHING
 ) -> EpisodeOutcome:
-    """Runs it to its end, with every property watching.
+    """Run an episode to its end, with every property watching.
 
     Args:
         episode: What to run.

@@ -41,7 +41,7 @@ class Operator(EpisodeOperator):
         return at_rest and self._row is None and not self.changes
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One tick."""
+        """Run one tick."""
         if self.changes and self.changes[0][0] <= tick:
             self._change(tick, self.changes.pop(0)[1], latest)
         elif self._row is not None:
@@ -107,7 +107,7 @@ class Operator(EpisodeOperator):
 
 
 def commanded(station: Workstation, row: ScriptRow) -> tuple[Value, ...]:
-    """A row as TASK's order, without its number.
+    """Return a row as TASK's order, without its number.
 
     Raises:
         ValueError: It is none of TASK's.

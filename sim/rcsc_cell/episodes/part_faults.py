@@ -33,7 +33,7 @@ def _top(part: str) -> str:
 
 
 def _asked(rows: Sequence[str]) -> Iterator[str]:
-    """Objects that rows take from the buffer."""
+    """Yield objects that rows take from the buffer."""
     for row in rows_of("\n".join((COLUMNS, *rows)), COLUMNS.split(",")):
         name = PARTS.get(row["part"].partition(" ")[0])
         if name and row["source"] == "BUFFER":

@@ -69,7 +69,7 @@ ONLY_WITHOUT_PHYSICS = (
 
 
 def draw(seed: int, backend: Backend = "kinematic", system: Path = SYSTEM) -> Episode:
-    """The episode of a seed.
+    """Return the episode of a seed.
 
     Raises:
         BadDescription: The system is not in order.
@@ -94,7 +94,7 @@ def _described(system: Path, _time_ns: int) -> Description:
 
 
 def place(random: Random, kind: str) -> PartSpec:
-    """A part somewhere on the buffer, where the camera sees it from its first pose."""
+    """Return a part somewhere on the buffer, where the camera sees it from its first pose."""
     edge = random.random() < 0.2
     x_mm = random.choice((-80.0, 60.0)) if edge else random.uniform(-70.0, 50.0)
     y_mm = random.choice((-80.0, 80.0)) if edge else random.uniform(-70.0, 70.0)
@@ -128,7 +128,7 @@ def _script(random: Random, kind: str, backend: Backend) -> tuple[str, ...]:
 
 
 def when(random: Random, rows: Sequence[str]) -> int:
-    """A tick at which something may be under way; the first ones more often than others."""
+    """Return a tick at which something may be under way; the first ones more often than others."""
     return random.choice((0, 1, 2)) if random.random() < 0.1 else random.randint(3, 250 + 40 * len(rows))
 
 

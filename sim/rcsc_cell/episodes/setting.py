@@ -23,7 +23,7 @@ from rcsc_cell.workstation.station import workstation
 
 
 def ready(system: Path) -> tuple[Stand, Database]:
-    """The system with its database, read once while their files do not change.
+    """Return the system with its database, read once while their files do not change.
 
     Raises:
         BadDescription, BadData: They are not in order.
@@ -42,7 +42,7 @@ def _database(system: Path, _files: tuple[tuple[str, int], ...], _time_ns: int) 
 
 @lru_cache(maxsize=1024)
 def rows_of(rows: tuple[str, ...]) -> tuple[ScriptRow, ...]:
-    """Rows of a script.
+    """Return rows of a script.
 
     Raises:
         BadScript: One says nothing that a workstation can do.
@@ -54,7 +54,7 @@ def rows_of(rows: tuple[str, ...]) -> tuple[ScriptRow, ...]:
 
 
 def operator_of(episode: Episode, database: Database, task: Signature) -> Operator:
-    """The workstation with the episode's script, and whoever interrupts it.
+    """Return the workstation with the episode's script, and whoever interrupts it.
 
     Raises:
         BadScript: A row says nothing, or names something unknown.
@@ -73,7 +73,7 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
 
 
 def lying(database: Database, part: PartSpec) -> Lying:
-    """A part where the episode has it.
+    """Return a part where the episode has it.
 
     Raises:
         BadData: No part or no station is called so.

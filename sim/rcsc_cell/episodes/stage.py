@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 def physical(setup: Setup) -> Staged:
-    """The cell by contact physics."""
+    """Return the cell by contact physics."""
     return _staged(setup, "mujoco")
 
 
 def kinematic(setup: Setup) -> Staged:
-    """The cell by kinematics alone."""
+    """Return the cell by kinematics alone."""
     return _staged(setup, "kinematic")
 
 
 def _staged(setup: Setup, backend: "Backend") -> Staged:
-    """What stands outside.
+    """Return the cell with its workstation.
 
     Raises:
         BadDescription, BadData, BadScript: Something is not in order; nothing has moved.

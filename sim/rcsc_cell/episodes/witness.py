@@ -42,18 +42,18 @@ class Timed:
     seconds: float = 0.0
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
-        """One cycle."""
+        """Run one cycle."""
         begun = time.perf_counter()
         given = self.inner.step(tick, latest)
         self.seconds += time.perf_counter() - begun
         return given
 
     def space(self) -> SpaceOfPlant:
-        """The plant's."""
+        """Return the plant's."""
         return self.inner.space()
 
     def state(self) -> dict[str, object]:
-        """The plant's."""
+        """Return the plant's."""
         return self.inner.state()
 
     def restore(self, state: Mapping[str, object]) -> None:
@@ -93,7 +93,7 @@ class Witness(RunWitness):
     margins_deg: tuple[float, ...] = (360.0,) * 6
 
     def __post_init__(self) -> None:
-        """Names the pictures; a solid one is drawn where there is physics."""
+        """Name the pictures; a solid one is drawn where there is physics."""
         mechanism = self.plant.mechanism
         pictures = {"stick": lambda: self.figure(self.run.system)}
         if isinstance(mechanism, Physical):
@@ -106,7 +106,7 @@ class Witness(RunWitness):
         return self.timed.inner
 
     def look(self) -> None:
-        """Keeps the least distances of the joints from their limits."""
+        """Keep the least distances of the joints from their limits."""
         margins = margins_deg(self.plant.mechanism.joints())
         self.margins_deg = tuple(map(min, self.margins_deg, margins))
 
@@ -124,7 +124,7 @@ class Witness(RunWitness):
     # --- what became of it ---
 
     def placed(self) -> tuple[PartPlace, ...]:
-        """Every part that the script put somewhere and did not take again."""
+        """Return every part that the script put somewhere and did not take again."""
         operator = self.run.operator
         return (
             placements(operator.results, self.database, self.plant)
@@ -192,7 +192,7 @@ def _nearest(place: str, part: str, sector: int, database: Database, plant: Plan
 
 
 def _upright(place: str, sector: int, number: int, database: Database) -> Vector | None:
-    """The middle of a part that stands upright at a location; None where it lies tilted."""
+    """Return the middle of a part that stands upright at a location; None where it lies tilted."""
     plate = database.plate(database.locations[place], sector)
     if plate is None or plate.axis(2)[2] > -0.999:
         return None

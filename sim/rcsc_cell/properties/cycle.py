@@ -84,18 +84,18 @@ class CycleState(Cycle):
     held: tuple[int, ...] = ()
 
     def look(self) -> None:
-        """Reads the cell's truth."""
+        """Read the cell's truth."""
         mechanism = self.plant.mechanism
         self.joints, self.parts, self.touching = mechanism.joints(), mechanism.parts(), mechanism.touching()
         self.opening_mm, self.force_n = mechanism.hand()
         self.held = _held(self.touching) if self.opening_mm >= APART_MM else ()
 
     def shown(self, level: str, leaf: str) -> str:
-        """A leaf in the words of the tables."""
+        """Return a leaf in the words of the tables."""
         return self.levels[level].shown(leaf)
 
     def value(self, level: str, leaf: str) -> Value:
-        """A leaf."""
+        """Return a leaf."""
         return self.levels[level].value(leaf)
 
     def was_active(self, names: frozenset[str], since_tick: int) -> bool:
@@ -132,7 +132,7 @@ class CycleState(Cycle):
 
 
 def _held(touching: frozenset[tuple[str, str]]) -> tuple[int, ...]:
-    """Parts that both pads touch."""
+    """Return parts that both pads touch."""
     left = {other for pad, other in touching if pad == "pad_left"}
     right = {other for pad, other in touching if pad == "pad_right"}
     return tuple(sorted(int(name[4:]) for name in left & right if name.startswith("part")))
@@ -152,7 +152,7 @@ class Property(Protocol):
     def __init__(self, cycle: CycleState) -> None: ...
 
     def watch(self, cycle: CycleState) -> str | None:
-        """What is wrong in this cycle; None for nothing."""
+        """Return the violation in this cycle; None where it holds."""
         ...
 
 

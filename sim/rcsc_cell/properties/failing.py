@@ -70,7 +70,7 @@ class RightReason:
         self._begun: Command | None = None
 
     def watch(self, cycle: CycleState) -> str | None:
-        """The reason that nothing explains, or the command that should have failed."""
+        """Return the reason that nothing explains, or the command that should have failed."""
         self._restarted = self._restarted or bool(cycle.restarted)
         command = cycle.command
         if command is not self._begun:
@@ -179,7 +179,7 @@ class StillAfterFail:
         self._joints, self._opening_mm = cycle.joints, cycle.opening_mm
 
     def watch(self, cycle: CycleState) -> str | None:
-        """What moved."""
+        """Return the joint, finger or part that moved."""
         command = cycle.command
         if command is not self._command:
             self._command = command

@@ -40,7 +40,7 @@ class OnlyAllowedContact:
         self._seen: frozenset[tuple[str, str]] = frozenset()
 
     def watch(self, cycle: CycleState) -> str | None:
-        """What touched what."""
+        """Return the two bodies that touched."""
         if cycle.touching == self._seen:
             return None
         self._seen = cycle.touching
@@ -84,7 +84,7 @@ class ForceWithin:
         self._key = (-1, -1)
 
     def watch(self, cycle: CycleState) -> str | None:
-        """How hard they pressed."""
+        """Return the force that they pressed with."""
         primitive = cycle.levels["primitive"]
         key = int(primitive.value("emove.obj_ptr")), int(primitive.value("emove.grasp"))
         if key != self._key:
@@ -110,7 +110,7 @@ class JointsWithin:
         self._most_mm = _fastest_mm_s(cycle.database) * SPEED_SHARE * CYCLE_S + SPEED_MM_S * CYCLE_S
 
     def watch(self, cycle: CycleState) -> str | None:
-        """Which joint, and how far or how fast."""
+        """Return the joint or the plate, and how far it went."""
         if ORDERS in cycle.harmed:
             self._gap = cycle.tick
         if cycle.joints == self._before:
@@ -134,6 +134,6 @@ class JointsWithin:
 
 
 def _fastest_mm_s(database: Database) -> float:
-    """The greatest speed of a point."""
+    """Return the greatest speed of a point."""
     points = {int(point) for _, _, row in database.routes() for point in (row[1], row[3], *row[5:])}
     return max(float(database.point(point)[10]) for point in points)

@@ -59,7 +59,7 @@ class DoneTrue:
         self._forgot: int | None = None  # when TASK lost its state, until the hand is empty
 
     def watch(self, cycle: CycleState) -> str | None:
-        """In which way it is not."""
+        """Return what is false of a DONE."""
         self._follow(cycle)
         before, self._before = self._before, cycle.joints
         if cycle.command is None or cycle.ended != "done":
@@ -168,7 +168,7 @@ class CountsTrue:
         self._forgot = -CLOSING_TICKS
 
     def watch(self, cycle: CycleState) -> str | None:
-        """Which count is wrong."""
+        """Return the count that is wrong."""
         if "task" in cycle.restarted:
             self._excused, self._forgot = True, cycle.tick  # it has forgotten what it counted
         if cycle.command is not self._begun:
@@ -223,7 +223,7 @@ def _under_way(cycle: CycleState, command: str) -> bool:
 
 
 def _ends_at(cycle: CycleState, command: Command) -> int:
-    """The location at which the robot ends; 0 where the command leaves it where it is."""
+    """Return the location at which the robot ends; 0 where the command leaves it where it is."""
     match command.name:
         case "acquire":
             return command.source or command.here

@@ -70,24 +70,24 @@ class Reader:
         return tuple(self.sign.index[str(v.name)] for v in self.program.variables if v.kind is Kind.INPUT)
 
     def at(self, leaf: str) -> int:
-        """The place of a leaf."""
+        """Return the place of a leaf."""
         return self.sign.index[leaf]
 
     def record(self, name: str) -> range:
-        """The places of a record's leaves."""
+        """Return the places of a record's leaves."""
         return self.sign.record(name)
 
     def shown(self, leaf: str, values: Values) -> str:
-        """A leaf with its value, in words."""
+        """Return a leaf with its value, in words."""
         at = self.at(leaf)
         return f"`{leaf}` = {self.sign.leaves[at].shown(values[at])}"
 
     def table(self, name: str) -> Table:
-        """A table of the program."""
+        """Return a table of the program."""
         return next(table for table in self.program.tables if table.name == name)
 
     def snapshot(self, values: Values) -> dict[str, Value]:
-        """All leaves by their names."""
+        """Return all leaves by their names."""
         return {name: values[at] for name, at in self.sign.index.items()}
 
     def true(self, condition: Expr, now: Values, before: Values) -> bool:
@@ -98,7 +98,7 @@ class Reader:
             return False
 
     def prepared(self, now: Now) -> dict[str, Value]:
-        """All leaves as the first table of the cycle saw them."""
+        """Return all leaves as the first table of the cycle saw them."""
         if now.seen is None:
             seen = self.snapshot(now.stood)
             names = [self.sign.leaves[at].name for at in self.inputs]
@@ -107,7 +107,7 @@ class Reader:
         return now.seen
 
     def begun(self, seen: dict[str, Value]) -> dict[str, Value]:
-        """The same leaves after deferred values were taken and the preprocess ran."""
+        """Return the same leaves after deferred values were taken and the preprocess ran."""
         settle(self.program, seen)
         for name in self.level.preprocess:
             call(self.program, name, [], seen)
@@ -128,7 +128,7 @@ class _Both(dict[str, Value]):
 
 
 def told(reader: Reader, names: Iterator[str], now: Values, before: Values) -> str:
-    """Leaves with their values, in words."""
+    """Return leaves with their values, in words."""
     words = (
         f"was {reader.shown(name.removeprefix(BEFORE), before)}"
         if name.startswith(BEFORE)

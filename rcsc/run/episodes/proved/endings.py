@@ -62,7 +62,7 @@ class Endings:
     _records: dict[str, tuple[int, ...]] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Finds the places of what comes round, and of what stands still."""
+        """Find the places of what comes round, and of what stands still."""
         moving = {leaf for below in self.level.below for leaf in (below.number, below.echo)}
         leaves = self.reader.sign.leaves
         self._kept = tuple(at for at, leaf in enumerate(leaves) if leaf.name not in moving)
@@ -75,7 +75,7 @@ class Endings:
         }
 
     def broken(self, now: Now) -> tuple[Claim, str] | None:
-        """The claim that a round of the level breaks, which ends with this cycle, and the round in words."""
+        """Return the claim that a round of the level breaks, which ends with this cycle, and the round in words."""
         above = self.level.above
         assert above is not None
         table, number = now.lines[-1][0] if now.lines else "", self.reader.at(above.number)

@@ -29,7 +29,7 @@ class Trusts:
     """
 
     def __init__(self, claims: Claims, stand: Stand, readers: Mapping[str, Reader]) -> None:
-        """Finds how each is looked at."""
+        """Find how each is looked at."""
         self.broken: dict[Trusted, str] = {}
         self._of: dict[str, list[tuple[Trusted, Check]]] = {name: [] for name in readers}
         levels = {level.name: level for level in claims.levels}

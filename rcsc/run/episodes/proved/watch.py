@@ -31,7 +31,7 @@ class ProvedHolds:
     """
 
     def __init__(self, claims: Claims, stand: Stand) -> None:
-        """Finds how each claim is looked at."""
+        """Find how each claim is looked at."""
         self._readers = {level.name: _reader(level, stand) for level in claims.levels}
         self._trusts = Trusts(claims, stand, self._readers)
         self.watched: list[Claim] = []
@@ -64,7 +64,7 @@ class ProvedHolds:
             self._endings[level.name] = Endings(level, reader, ending)
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Which claims do not hold in this cycle."""
+        """Yield the claims that this cycle breaks."""
         for name in cycle.restarted & self._readers.keys():
             self._before[name] = self._stood[name] = cycle.before[name]
             self._anew.add(name)
