@@ -40,7 +40,7 @@ from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.run.episodes.episode import Restart
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption
+from rcsc_cell.episodes.episode import Episode, Interruption, SwitchTo
 from rcsc_cell.episodes.loop import Loop
 from tests.matrix import ACQUIRE, project
 from tests.support.faults_made import LEVELS, Fault, sample
@@ -62,7 +62,7 @@ EPISODES: tuple[Episode, ...] = (
         ACQUIRE,
         rows=(),
         interruptions=(Interruption(1, "ACQUIRE,BOXT (2),FIX-MAC5,,"),),
-        faults=(FaultSpec("hand_weak", 60, 999),),
+        faults=(SwitchTo("hand_weak", 60, 999),),
     ),
 )
 """A part is fetched; the same, interrupted, and with levels that begin anew; and none is there to be gripped."""

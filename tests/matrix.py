@@ -21,7 +21,7 @@ from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.run.episodes.episode import Restart
 from rcsc.run.episodes.outcome import EpisodeFinding
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption
+from rcsc_cell.episodes.episode import Episode, Interruption, SwitchTo
 from rcsc_cell.episodes.loop import Loop
 from tests.support import loops
 from tests.support.programs.stages import emitted
@@ -56,7 +56,7 @@ BUGS = (
             ACQUIRE,
             rows=(),
             interruptions=(Interruption(1, "ACQUIRE,BOXT (2),FIX-MAC5,,"),),
-            faults=(FaultSpec("hand_weak", 60, 999),),
+            faults=(SwitchTo("hand_weak", 60, 999),),
         ),
     ),
     Bug(
@@ -105,7 +105,7 @@ BUGS = (
         "tables/task/common.rcs",
         "  to_workstation.failure := loc\n",
         "  to_workstation.failure := pic\n",
-        replace(ACQUIRE, faults=(FaultSpec("blind", 0, 99_999),)),
+        replace(ACQUIRE, faults=(SwitchTo("blind", 0, 99_999),)),
     ),
     Bug(
         "E-MOVE does not pass PAUSE on",

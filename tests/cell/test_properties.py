@@ -12,10 +12,10 @@ from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
-    FaultSpec,
     Interruption,
     PartSpec,
     Push,
+    SwitchTo,
 )
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.episodes.part_faults import fault_classes
@@ -75,31 +75,31 @@ ASIDE = replace(TBOX[0], y_mm=-70.0)
 """Farther from the middle of the picture than another."""
 AGAIN = replace(ACQUIRE, rows=(*MAKE_BOXT[:4], "ACQUIRE,BOXT (2),FIX-MAC5,,"))
 REACHES: dict[str, tuple[Episode, str]] = {
-    "robot_stuck": (replace(ACQUIRE, faults=(FaultSpec("robot_stuck", 10, EVER),)), "failed:move"),
-    "joint_stuck": (replace(ACQUIRE, faults=(FaultSpec("joint_stuck", 10, EVER, 2.0),)), "failed:move"),
-    "robot_refuses": (replace(ACQUIRE, faults=(FaultSpec("robot_refuses", 30, 40),)), "failed:move"),
-    "unreadable": (replace(ACQUIRE, faults=(FaultSpec("unreadable", 30, 40),)), "failed:move"),
-    "hand_stuck": (replace(ACQUIRE, faults=(FaultSpec("hand_stuck", 0, EVER),)), "failed:loc"),
-    "hand_weak": (replace(ACQUIRE, faults=(FaultSpec("hand_weak", 0, EVER),)), "failed:pic"),
-    "jammed": (replace(ACQUIRE, faults=(FaultSpec("jammed", 0, EVER),)), "failed:loc"),
-    "slips": (replace(AGAIN, faults=(FaultSpec("slips", 0, 400),)), "failed:nothing_gripped"),
-    "drops": (replace(AGAIN, faults=(FaultSpec("drops", 222, 232),)), "failed:nothing_gripped"),
-    "blind": (replace(ACQUIRE, faults=(FaultSpec("blind", 0, EVER),)), "failed:loc"),
-    "dark": (replace(ACQUIRE, faults=(FaultSpec("dark", 0, EVER),)), "failed:loc"),
-    "late_ticks": (replace(ACQUIRE, faults=(FaultSpec("late_ticks", 0, EVER, 120.0),)), "failed:loc"),
-    "noisy": (replace(ACQUIRE, faults=(FaultSpec("noisy", 0, EVER),)), "failed:loc"),
-    "shifted_mm": (replace(ACQUIRE, faults=(FaultSpec("shifted_mm", 0, EVER, 50.0),)), "failed:loc"),
-    "tilted": (replace(ACQUIRE, faults=(FaultSpec("tilted", 0, EVER),)), "failed:loc"),
+    "robot_stuck": (replace(ACQUIRE, faults=(SwitchTo("robot_stuck", 10, EVER),)), "failed:move"),
+    "joint_stuck": (replace(ACQUIRE, faults=(SwitchTo("joint_stuck", 10, EVER, 2.0),)), "failed:move"),
+    "robot_refuses": (replace(ACQUIRE, faults=(SwitchTo("robot_refuses", 30, 40),)), "failed:move"),
+    "unreadable": (replace(ACQUIRE, faults=(SwitchTo("unreadable", 30, 40),)), "failed:move"),
+    "hand_stuck": (replace(ACQUIRE, faults=(SwitchTo("hand_stuck", 0, EVER),)), "failed:loc"),
+    "hand_weak": (replace(ACQUIRE, faults=(SwitchTo("hand_weak", 0, EVER),)), "failed:pic"),
+    "jammed": (replace(ACQUIRE, faults=(SwitchTo("jammed", 0, EVER),)), "failed:loc"),
+    "slips": (replace(AGAIN, faults=(SwitchTo("slips", 0, 400),)), "failed:nothing_gripped"),
+    "drops": (replace(AGAIN, faults=(SwitchTo("drops", 222, 232),)), "failed:nothing_gripped"),
+    "blind": (replace(ACQUIRE, faults=(SwitchTo("blind", 0, EVER),)), "failed:loc"),
+    "dark": (replace(ACQUIRE, faults=(SwitchTo("dark", 0, EVER),)), "failed:loc"),
+    "late_ticks": (replace(ACQUIRE, faults=(SwitchTo("late_ticks", 0, EVER, 120.0),)), "failed:loc"),
+    "noisy": (replace(ACQUIRE, faults=(SwitchTo("noisy", 0, EVER),)), "failed:loc"),
+    "shifted_mm": (replace(ACQUIRE, faults=(SwitchTo("shifted_mm", 0, EVER, 50.0),)), "failed:loc"),
+    "tilted": (replace(ACQUIRE, faults=(SwitchTo("tilted", 0, EVER),)), "failed:loc"),
     "vise_stuck": (
-        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(FaultSpec("vise_stuck", 100, EVER),)),
+        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(SwitchTo("vise_stuck", 100, EVER),)),
         "failed:vise",
     ),
     "vise_weak": (
-        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(FaultSpec("vise_weak", 100, EVER),)),
+        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(SwitchTo("vise_weak", 100, EVER),)),
         "failed:vise",
     ),
     "vise_mute": (
-        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(FaultSpec("vise_mute", 100, EVER),)),
+        replace(ACQUIRE, rows=MAKE_BOXT[:4], faults=(SwitchTo("vise_mute", 100, EVER),)),
         "failed:vise",
     ),
     "restarted": (replace(ACQUIRE, restarts=(Restart(40, "emove"),)), "failed:move"),
@@ -174,7 +174,7 @@ OPEN: dict[str, tuple[PropertyClass, Episode, str]] = {
     ),
     "nobody looks at the hand after the end of the way": (
         DoneWithoutExcuse,
-        replace(ACQUIRE, rows=(*ACQUIRE.rows, "MOVE,,,WS-SAFE,"), faults=(FaultSpec("drops", 271, 276),)),
+        replace(ACQUIRE, rows=(*ACQUIRE.rows, "MOVE,,,WS-SAFE,"), faults=(SwitchTo("drops", 271, 276),)),
         "nothing is between the pads",
     ),
 }
@@ -193,7 +193,7 @@ def test_a_fault_that_is_over_excuses_nothing(tmp_path: Path) -> None:
     bug = next(bug for bug in BUGS if bug.property == "DONE is true")
     system = project(tmp_path)
     seed(bug, tmp_path)
-    before = (FaultSpec("drops", 0, 3), FaultSpec("robot_stuck", 0, 1))
+    before = (SwitchTo("drops", 0, 3), SwitchTo("robot_stuck", 0, 1))
     assert "nothing is between" in found_by(DoneTrue, replace(bug.episode, faults=before), system)
 
 

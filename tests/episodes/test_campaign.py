@@ -45,10 +45,10 @@ from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
-    FaultSpec,
     Interruption,
     PartSpec,
     Push,
+    SwitchTo,
 )
 from rcsc_cell.episodes.kind import CELL
 from rcsc_cell.workstation.script import read_script
@@ -137,7 +137,7 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
 
 
 def _faults(rig: Rig[Episode], index: int, seed: int = 5) -> list[str]:
-    return [fault.name for fault in rig.episode(seed, index).faults]
+    return [fault.fault for fault in rig.episode(seed, index).faults]
 
 
 def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) -> None:
@@ -443,7 +443,7 @@ def test_lines_are_bits_and_every_line_of_the_tables_is_known() -> None:
 # --- shrinking ---
 
 EVERYTHING = Episode(
-    parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
+    parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(SwitchTo("slips", 3, 4),),
     transport=(BufferFault("task.to_workstation", "lost", 3, 4),), restarts=(Restart(3, "task"),),
     interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
 )  # fmt: skip
@@ -474,7 +474,7 @@ def test_a_push_comes_to_what_is_usual() -> None:
 
 PARTS = [PartSpec("tbox", x_mm=float(at)) for at in range(6)]
 SWITCHES = [
-    FaultSpec(name, at, at + 5)
+    SwitchTo(name, at, at + 5)
     for at, name in enumerate(("drops", "dark", "blind", "noisy", "slips", "tilted"))
 ]
 HARMED = [BufferFault("task.to_workstation", "lost", at, at) for at in range(5)]
@@ -488,7 +488,7 @@ def _some(of: Sequence[Any]) -> st.SearchStrategy[tuple[Any, ...]]:
 @settings(max_examples=60)
 def test_what_is_needed_is_what_is_left(
     parts: tuple[PartSpec, ...],
-    faults: tuple[FaultSpec, ...],
+    faults: tuple[SwitchTo, ...],
     harmed: tuple[BufferFault, ...],
     draw: st.DataObject,
 ) -> None:
@@ -515,7 +515,7 @@ def test_windows_narrow_and_numbers_come_to_what_is_usual(first: int, length: in
         seed=77,
         step_s=0.004,
         parts=(PartSpec("tbox", x_mm=60.3, yaw_deg=12.5, size_mm=(1.0, 2.0, 3.0), density_kg_m3=9000.0),),
-        faults=(FaultSpec("drops", first, first + length, 4.0),),
+        faults=(SwitchTo("drops", first, first + length, 4.0),),
         restarts=(Restart(900, "task"),),
     )
 
@@ -623,14 +623,14 @@ def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
     with processes(1) as pool:
         [(_, made)] = counterexamples(rig, 5, [Choice(index, (), "the process survives")], pool)
     assert made.episode == Episode(faults=(replace(made.episode.faults[0]),))
-    assert [(fault.name, fault.first_tick == fault.last_tick) for fault in made.episode.faults] == [
+    assert [(fault.fault, fault.first_tick == fault.last_tick) for fault in made.episode.faults] == [
         (fake.KILLS, True)
     ]
     assert (made.finding.property, made.log) == ("the process survives", b"begun")
 
 
 def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:
-    for content in ("", "3", "{", '{"rows": 3}', '{"faults": [{"name": "nobody"}]}', '{"backend": "paper"}'):
+    for content in ("", "3", "{", '{"rows": 3}', '{"faults": [{"fault": "nobody"}]}', '{"backend": "paper"}'):
         (tmp_path / "episode.json").write_text(content)
         with pytest.raises(BadEpisode, match=r"episode\.json"):
             again(tmp_path, PLAIN)

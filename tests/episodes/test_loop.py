@@ -26,10 +26,10 @@ from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
-    FaultSpec,
     Interruption,
     PartSpec,
     Push,
+    SwitchTo,
     script,
 )
 from rcsc_cell.episodes.loop import Loop, run
@@ -71,7 +71,7 @@ def test_what_once_did_not_hold_does(path: Path) -> None:
 
 ODD = replace(
     ACQUIRE,
-    faults=(FaultSpec("noisy", 80, 200),),
+    faults=(SwitchTo("noisy", 80, 200),),
     transport=(BufferFault("primitive.to_emove", "late", 20, 60),),
     restarts=(Restart(40, "vision"),),
     interruptions=(Interruption(30, "MOVE,,,FIX-SAFE,"), Interruption(80, "ACQUIRE,BOXT (2),BUFFER,,")),
@@ -155,7 +155,7 @@ def test_an_episode_travels_as_json(episode: Episode) -> None:
         "[]",
         "nothing",
         '{"backend": "paper"}',
-        '{"faults": [{"name": "sunspots", "first_tick": 0, "last_tick": 1}]}',
+        '{"faults": [{"fault": "sunspots", "first_tick": 0, "last_tick": 1}]}',
         '{"parts": [{"weight": 3}]}',
         '{"transport": [{"buffer": "a", "kind": "eaten", "first_tick": 0, "last_tick": 1}]}',
         '{"backend": "mujoco", "pushes": [{"tick": 0, "part": 0, "x_mm": 1, "y_mm": 1}]}',
@@ -271,7 +271,7 @@ def test_a_value_that_was_held_up_arrives_though_nothing_follows() -> None:
 
 
 def test_a_switch_has_the_value_of_its_window() -> None:
-    windows = (FaultSpec("shifted_mm", 2, 3, 5.0), FaultSpec("shifted_mm", 4, 4, 30.0))
+    windows = (SwitchTo("shifted_mm", 2, 3, 5.0), SwitchTo("shifted_mm", 4, 4, 30.0))
     loop, seen = Loop(Episode(faults=windows), SYSTEM), []
     for _ in range(6):
         loop.step()

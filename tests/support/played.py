@@ -16,7 +16,7 @@ from random import Random
 from rcsc.run.campaign.rig import known_lines
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, RowEnd
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
-from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, PartSpec
+from rcsc_cell.episodes.episode import SYSTEM, Episode, PartSpec, SwitchTo
 from rcsc_cell.episodes.loop import run as run_in_cell
 
 KILLS, HANGS, STUCK, RAISES, BREAKS = "slips", "dark", "jammed", "blind", "drops"
@@ -35,7 +35,7 @@ def calm(seed: int, system: Path, plant: str, script: str = "") -> Episode:  # n
         seed=seed,
         parts=tuple(PartSpec("tbox", x_mm=by.randrange(-40, 41)) for _ in range(by.randrange(3))),
         rows=tuple(by.choice(ROWS) for _ in range(by.randrange(1, 6))),
-        faults=tuple(FaultSpec(name, at := by.randrange(200), at + by.randrange(50)) for name in names),
+        faults=tuple(SwitchTo(name, at := by.randrange(200), at + by.randrange(50)) for name in names),
     )
 
 
@@ -43,19 +43,19 @@ def wild(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in ten kills its process and one in twenty raises."""
     episode = calm(seed, system, plant, script)
     worse = {0: KILLS, 1: KILLS, 2: RAISES}.get(seed % 20)
-    return replace(episode, faults=(*episode.faults, FaultSpec(worse, 3, 9))) if worse else episode
+    return replace(episode, faults=(*episode.faults, SwitchTo(worse, 3, 9))) if worse else episode
 
 
 def endless(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in eight never ends."""
     episode = calm(seed, system, plant, script)
-    return replace(episode, faults=(FaultSpec(HANGS, 0, 9),)) if seed % 8 == 0 else episode
+    return replace(episode, faults=(SwitchTo(HANGS, 0, 9),)) if seed % 8 == 0 else episode
 
 
 def stuck(seed: int, system: Path, plant: str, script: str = "") -> Episode:
     """As `calm`, but one in eight cannot be stopped."""
     episode = calm(seed, system, plant, script)
-    return replace(episode, faults=(FaultSpec(STUCK, 0, 9),)) if seed % 8 == 0 else episode
+    return replace(episode, faults=(SwitchTo(STUCK, 0, 9),)) if seed % 8 == 0 else episode
 
 
 def play(
@@ -68,7 +68,7 @@ def play(
     _note()
     if log is not None:
         log.write_bytes(b"begun")
-    names = {fault.name for fault in episode.faults}
+    names = {fault.fault for fault in episode.faults}
     if KILLS in names:
         os._exit(7)
     if RAISES in names:
@@ -84,7 +84,7 @@ def play(
     lines = known_lines(system)[: 3 + len(rows)]
     sum_ = hashlib.sha256(episode.to_json().encode()).hexdigest()
     found = [
-        EpisodeFinding(HELD, fault.first_tick, "it fell") for fault in episode.faults if fault.name == BREAKS
+        EpisodeFinding(HELD, fault.first_tick, "it fell") for fault in episode.faults if fault.fault == BREAKS
     ]
     return EpisodeOutcome(
         rows, tuple(found), "failed:part_lost" if found else "done", 10 * len(rows), frozenset(lines), sum_

@@ -9,7 +9,7 @@ from hypothesis.strategies import SearchStrategy
 from rcsc.run.description import description
 from rcsc.run.episodes.episode import BufferFault, Restart
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Interruption, PartSpec, Push
+from rcsc_cell.episodes.episode import SYSTEM, Episode, Interruption, PartSpec, Push, SwitchTo
 from rcsc_cell.episodes.sampling import (
     EMPTY_HAND,
     HARMS,
@@ -73,11 +73,11 @@ def rows() -> SearchStrategy[str]:
 
 
 @st.composite
-def faults(draw: st.DrawFn, ticks: SearchStrategy[int] = TICKS) -> FaultSpec:
+def faults(draw: st.DrawFn, ticks: SearchStrategy[int] = TICKS) -> SwitchTo:
     """A switch, from a tick on for some time."""
     name, first = draw(st.sampled_from(SWITCHES)), draw(ticks)
     value = draw(st.sampled_from(VALUES.get(name, (1.0,))))
-    return FaultSpec(name, first, first + draw(LASTING) - 1, value)
+    return SwitchTo(name, first, first + draw(LASTING) - 1, value)
 
 
 @st.composite
@@ -124,7 +124,7 @@ def episodes(draw: st.DrawFn, backend: Backend = "kinematic") -> Episode:
         draw(st.integers(0, 99)),
         here,
         draw(legal(kind)),
-        some(FaultSpec),  # type: ignore[arg-type]  # each is of the type that was asked for
+        some(SwitchTo),  # type: ignore[arg-type]  # each is of the type that was asked for
         some(BufferFault),  # type: ignore[arg-type]
         some(Restart),  # type: ignore[arg-type]
         some(Interruption),  # type: ignore[arg-type]

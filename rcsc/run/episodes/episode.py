@@ -6,9 +6,9 @@ An episode has the same outcome in every process, and with both kinds of executo
 
 import json
 from collections.abc import Iterator
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from itertools import chain
-from typing import ClassVar, Literal, TypeAlias, get_args
+from typing import ClassVar, Literal, Self, TypeAlias, get_args, get_type_hints
 
 from rcsc.base.host.files import csv_text
 from rcsc.base.host.files.names import shown
@@ -107,8 +107,50 @@ class Switch:
     last_tick: int
 
 
+class SavedEpisode:
+    """An episode that travels as JSON; a frozen dataclass of plain values and tuples.
+
+    Attributes:
+        LISTS: Its fields that hold any number of things, those first that a smaller episode can best do without.
+    """
+
+    __slots__ = ()
+    LISTS: ClassVar[tuple[str, ...]]
+
+    def to_json(self) -> str:
+        """Return text that `from_json` reads; the same for the same episode."""
+        return json.dumps(plain(self), indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Read an episode that `to_json` wrote; what is missing is as usual.
+
+        Raises:
+            ValueError: The text is none.
+        """
+        values = json_of(text)
+        if not isinstance(values, dict):
+            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
+        if stray := sorted(set(values) - set(usual := plain(cls()))):
+            raise ValueError(f"an episode has no {shown(stray[0])}")
+        for name, kind in get_type_hints(cls).items():
+            if name in cls.LISTS and isinstance(values.get(name), list):
+                values[name] = [_filled(get_args(kind)[0], element) for element in values[name]]
+        episode: Self = read(cls, {**usual, **values})
+        return episode
+
+
+def _filled(kind: type, element: object) -> object:
+    """Return an element of a list as it was read, with the defaults of what it does not say."""
+    if not isinstance(element, dict) or not is_dataclass(kind):
+        return element
+    return {
+        field.name: plain(field.default) for field in fields(kind) if field.default is not MISSING
+    } | element
+
+
 @dataclass(frozen=True, slots=True)
-class Episode:
+class Episode(SavedEpisode):
     """One run.
 
     Attributes:
@@ -159,28 +201,6 @@ class Episode:
                 if hasattr(element, name):
                     yield name, getattr(element, name)
 
-    def to_json(self) -> str:
-        """Return text that `from_json` reads; the same for the same episode."""
-        return json.dumps(plain(self), indent=1) + "\n"
-
-    @classmethod
-    def from_json(cls, text: str) -> "Episode":
-        """Read an episode that `to_json` wrote; what is missing is as usual.
-
-        Raises:
-            ValueError: The text is none.
-        """
-        values = json_of(text)
-        if not isinstance(values, dict):
-            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
-        if stray := sorted(set(values) - {field.name for field in fields(cls)}):
-            raise ValueError(f"an episode has no {shown(stray[0])}")
-        for name, kind in _ELEMENTS.items():
-            if isinstance(values.get(name), list):
-                values[name] = [_filled(kind, element) for element in values[name]]
-        episode: Episode = read(cls, {**plain(cls()), **values})
-        return episode
-
     def told(self) -> tuple[str, ...]:
         """Return the events of the episode in words, a line each."""
         return (
@@ -221,21 +241,6 @@ class Episode:
             ends = [cycles, *([" ".join(order.faults)] if faulty else [])]
             rows.append([order.command, *level, *(given.get(name, "") for name in columns), *ends])
         return csv_text(rows)
-
-
-_ELEMENTS: dict[str, type] = {
-    "orders": OrderSpec,
-    "harms": BufferFault,
-    "readings": Reading,
-    "restarts": Restart,
-    "switches": Switch,
-}
-
-
-def _filled(kind: type, element: object) -> object:
-    """Return an element of a list as it was read, with the defaults of what it does not say."""
-    usual = {field.name: plain(field.default) for field in fields(kind) if field.default is not MISSING}
-    return {**usual, **element} if isinstance(element, dict) else element
 
 
 _HARMS = {

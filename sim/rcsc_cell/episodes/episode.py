@@ -4,18 +4,15 @@ In: parts, a script, what goes wrong and when. Out: rows, findings, lines of tab
 the same outcome in every process and with both kinds of executors.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from itertools import chain
 from pathlib import Path
 from typing import ClassVar, get_args
 
 from rcsc.base.host.files.names import shown
-from rcsc.base.host.files.plain import plain, read
-from rcsc.base.host.files.read import json_of
 from rcsc.run.episodes.episode import FAULTS as OF_ANY_SYSTEM
-from rcsc.run.episodes.episode import BufferFault, Harm, Restart
+from rcsc.run.episodes.episode import BufferFault, Harm, Restart, SavedEpisode, Switch
 from rcsc.run.episodes.episode import Episode as EpisodeOfAnySystem
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
@@ -68,12 +65,9 @@ class PartSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class FaultSpec:
-    """A switch of `rcsc_cell.cell.faults.Faults` in these ticks, the last included."""
+class SwitchTo(Switch):
+    """A switch of `rcsc_cell.cell.faults.Faults` is set to a value in these ticks."""
 
-    name: str
-    first_tick: int
-    last_tick: int
     value: float = 1.0
 
 
@@ -96,7 +90,7 @@ class Push:
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
+class Episode(SavedEpisode):
     """One run.
 
     Attributes:
@@ -114,7 +108,7 @@ class Episode:
     seed: int = 0
     parts: tuple[PartSpec, ...] = ()
     rows: tuple[str, ...] = ()
-    faults: tuple[FaultSpec, ...] = ()
+    faults: tuple[SwitchTo, ...] = ()
     transport: tuple[BufferFault, ...] = ()
     restarts: tuple[Restart, ...] = ()
     interruptions: tuple[Interruption, ...] = ()
@@ -131,7 +125,7 @@ class Episode:
         known = {switch.name for switch in fields(Faults)}
         for word, words in (
             (self.backend, get_args(Backend)),
-            *((fault.name, known) for fault in self.faults),
+            *((fault.fault, known) for fault in self.faults),
         ):
             if word not in words:
                 raise ValueError(f"{shown(word)} is none of {', '.join(sorted(words))}")
@@ -161,23 +155,6 @@ class Episode:
     def script(self) -> str:
         """Return its rows as a script."""
         return script(self.rows)
-
-    def to_json(self) -> str:
-        """Return text that `from_json` reads; the same for the same episode."""
-        return json.dumps(asdict(self), indent=1) + "\n"
-
-    @classmethod
-    def from_json(cls, text: str) -> "Episode":
-        """Read an episode that `to_json` wrote.
-
-        Raises:
-            ValueError: The text is none.
-        """
-        values = json_of(text)
-        if not isinstance(values, dict):
-            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
-        episode: Episode = read(cls, {**plain(Episode()), **values})
-        return episode
 
 
 def script(rows: Sequence[str]) -> str:

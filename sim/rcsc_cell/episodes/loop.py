@@ -120,7 +120,7 @@ class Loop(loop.Loop):
     def _switch(self, tick: int) -> None:
         """Have on, of the plant's faults, those of this tick, each with its value; a command has to end in time all the same."""
         wanted = {
-            fault.name: fault.value
+            fault.fault: fault.value
             for fault in self.in_cell.faults
             if fault.first_tick <= tick <= fault.last_tick
         }

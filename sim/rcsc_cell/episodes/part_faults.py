@@ -46,7 +46,7 @@ def fault_classes(episode: Episode) -> tuple[str, ...]:
     Only parts that the script asks for count.
     """
     has = {
-        *(fault.name for fault in episode.faults),
+        *(fault.fault for fault in episode.faults),
         *(harm.kind for harm in episode.transport),
         *(("restarted",) if episode.restarts else ()),
         *(("changed command",) if episode.interruptions else ()),

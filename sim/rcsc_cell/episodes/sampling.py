@@ -14,7 +14,7 @@ from rcsc.run.description import Description, description
 from rcsc.run.episodes.episode import BufferFault, Harm, Restart
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Interruption, PartSpec, Push
+from rcsc_cell.episodes.episode import SYSTEM, Episode, Interruption, PartSpec, Push, SwitchTo
 
 HARMS: tuple[Harm, ...] = ("lost", "doubled", "stale", "late")
 VALUES: Mapping[str, tuple[float, ...]] = {
@@ -141,7 +141,7 @@ def _switch(random: Random, _: Description, episode: Episode) -> Episode:
     name, first = random.choice(SWITCHES), when(random, episode.rows)
     value = random.choice(VALUES.get(name, (1.0,)))
     return replace(
-        episode, faults=(*episode.faults, FaultSpec(name, first, first + lasting(random) - 1, value))
+        episode, faults=(*episode.faults, SwitchTo(name, first, first + lasting(random) - 1, value))
     )
 
 
