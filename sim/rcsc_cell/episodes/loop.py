@@ -29,6 +29,8 @@ from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
 
 NUMBERS = ("inc_command", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector")
 """Fields of TASK's orders that are no words."""
+WITHIN_TICKS = 1500
+"""Within which a command ends, whatever goes wrong with the cell: what a table waits for has a limit there. Twice the longest seen."""
 USUAL: Mapping[str, float] = {switch.name: getattr(Faults(), switch.name) for switch in fields(Faults)}
 """How each switch stands when nothing is wrong: bools, integers and floats."""
 
@@ -59,6 +61,7 @@ class Loop(loop.Loop):
         claims: Claims = NOTHING,
     ) -> None:
         its, self.database = ready(system)
+        its = replace(its, system=replace(its.system, within=WITHIN_TICKS))
         refused = ""
         try:
             self.orders = operator_of(episode, self.database, its.signs["task"])
