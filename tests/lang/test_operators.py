@@ -810,3 +810,25 @@ def test_where_no_line_matches_what_is_no_number_an_input_is_tried(kind: str) ->
         if isinstance(wrong, Gap | Overlap) and isinstance(wrong, wanted)
     ]
     assert len(matching_lines(program.tables[0], {"n": 0, **witness})) == (0 if wanted is Gap else 2)
+
+
+@pytest.mark.parametrize("word", sorted(LOGIC))
+def test_a_word_means_the_same_in_a_cell_as_in_a_declaration(word: str) -> None:
+    condition = f"a and b {word} c"
+    program = program_of(
+        f"""\
+state a : bool state b : bool state c : bool
+invariant said : {condition}
+table t {{
+  | line  | when        || procedures |
+  | holds | {condition} ||            |
+  | rest  | DEFAULT     ||            |
+}}
+level l {{ period 40 [ms] table t }}
+"""
+    )
+    [said] = program.invariants
+    for a, b, c in product((False, True), repeat=3):
+        given = {"a": a, "b": b, "c": c}
+        matched = matching_lines(program.tables[0], given)
+        assert (matched == ["holds"]) == evaluate(said.condition, given), given

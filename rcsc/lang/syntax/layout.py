@@ -14,6 +14,7 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
+from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS, REQUIREMENTS
 from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_names, spell_statement
@@ -25,7 +26,7 @@ _IN_NAMES = re.compile(r"(?<=[A-Za-z0-9]_)(?=[A-Za-z])|(?<=[A-Za-z0-9_\])]\.)(?=
 _QUOTED = re.compile(r'"[^"]*"(?:, )?')
 _BLANK = re.compile(r"(?<=[^_.]) ")
 _OPERATORS = frozenset("= /= < <= > >= + - * / mod .. :=".split())
-_BEFORE = _OPERATORS | frozenset("in not was when for next and or xor implies".split())
+_BEFORE = _OPERATORS | LOGIC | frozenset("in not was when for next".split())
 """Words that stay with what follows them. What follows an operator, or is one, stays with what is before it, too."""
 
 

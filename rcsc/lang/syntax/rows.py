@@ -13,6 +13,7 @@ from itertools import chain
 from typing import Generic, TypeVar, overload
 
 from rcsc.base.diagnostics.source import Span
+from rcsc.lang.operator_table import LOGIC
 
 ACTION_WORDS = frozenset({"procedures", "command_out", "status_out"})
 REQUIREMENTS = "req"
@@ -155,10 +156,8 @@ def stub_of(cell: Cell) -> Stub:
     return Stub(cell.part(*stub.span("name")), tuple(lines["above"]), tuple(lines["same"]))
 
 
-_JOINTS = re.compile(
-    r"[\[({]|[\])}]|(?<![\w.@])(?:and|or|xor|implies|when)(?!\w)|(?<!\w)\d\w*(?:and|or|xor|implies|when)",
-    re.ASCII,
-)
+_JOINED = "|".join(sorted((*LOGIC, "when")))
+_JOINTS = re.compile(rf"[\[({{]|[\])}}]|(?<![\w.@])(?:{_JOINED})(?!\w)|(?<!\w)\d\w*(?:{_JOINED})", re.ASCII)
 """Brackets, what joins conditions, and a number with such a word at its end, without a blank: `1or`."""
 
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 from rcsc.desk.editor.names.find import Names
 from rcsc.desk.editor.names.index import Occurrence, Space
+from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 
-KEYWORDS = frozenset(
+KEYWORDS = LOGIC | frozenset(
     """
     use unit const set enum type record input state output assume assumed monitored proved invariant property procedure module
     extern owner table assuming link serves commands adopt level period preprocess postprocess by if else case for in local next
-    and or xor not implies mod was when then until upon true false bool int real single array of clamp reject deferred safe restart
+    not mod was when then until upon true false bool int real single array of clamp reject deferred safe restart
     reads writes python c command rest status done failed executing order report stream reason within answered cycles without after
     again above same all line DEFAULT unreachable procedures command_out status_out req abs min max count
     """.split()
