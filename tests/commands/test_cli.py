@@ -318,8 +318,10 @@ def test_a_full_disk_is_a_coded_error(rcsc: Rcsc) -> None:
 def test_colour_when_asked_for_and_not_else(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
     write("grip.rcs", GAP)
     assert "\x1b" not in rcsc("check").out
+    painted = rcsc("check", "--no-cache", "--quiet", "--color", "always").out
+    assert "\x1b[1;31merror" in painted
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b[" in rcsc("check", "--color", "always").out
+    assert rcsc("check", "--no-cache", "--quiet", "--color", "always").out == painted
 
 
 def test_a_reader_that_goes_away_is_no_bug() -> None:

@@ -97,7 +97,9 @@ def paint(rows: Iterable[Row]) -> str:
     from rich.console import Console
     from rich.text import Text
 
-    console = Console(force_terminal=True, color_system="standard", width=100_000, highlight=False)
+    console = Console(
+        force_terminal=True, color_system="standard", no_color=False, width=100_000, highlight=False
+    )  # whether to paint was decided before, also against NO_COLOR
     with console.capture() as captured:
         for row in rows:
             text = Text(no_wrap=True, end="\n")
