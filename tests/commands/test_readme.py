@@ -115,6 +115,7 @@ def ends_with(command: str, monkeypatch: pytest.MonkeyPatch) -> int:
     assert words[:2] == ["python", "-m"], command
     with monkeypatch.context() as patch:
         patch.setattr(sys, "argv", words[2:])
+        patch.delitem(sys.modules, words[2], raising=False)  # another test may have imported it
         try:
             runpy.run_module(words[2], run_name="__main__", alter_sys=True)
         except SystemExit as ended:

@@ -22,7 +22,7 @@ from tests.support.programs.systems import HOPED, small_system, small_text, solo
 from tests.support.programs.texts import edit_file, level, table
 
 KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
-DECIDES = "is not known: `rcsc prove system.toml` decides it"
+DECIDES = "are not proved of the levels together: `rcsc prove system.toml` decides them"
 DONE = "| 4    | false       | d_state   |       ||                | done       |"
 
 Said = Callable[..., str]
@@ -89,7 +89,7 @@ def test_what_was_proved_together_is_told_with_what_to_write(
     head = 'name = "s"\ngenerated = "generated"\ntick_ms = 10\n[[level]]\nname = "machine"\n'
     (tmp_path / "system.toml").write_text(head + wires, encoding="utf-8")
     assert run(["check", "machine.rcs"]) == 1
-    assert "proved of the levels together" not in capfd.readouterr().out
+    assert "comes in system.toml: proved" not in capfd.readouterr().out
     assert prove("--invariants") == 0
     [said] = [
         line for line in capfd.readouterr().out.splitlines() if line.startswith("  invariant of_machine : ")

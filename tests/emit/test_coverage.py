@@ -399,7 +399,7 @@ def test_a_file_that_holds_one_program_is_refused_for_two(tmp_path: Path) -> Non
     document = set_of(SMALL)
     for name in ("v.c", "v.csv"):
         [finding] = write_vectors([document, document], tmp_path / name, None)
-        assert "holds what is of one program" in finding.message
+        assert "vectors of one program, and there are 2" in finding.message
         assert not (tmp_path / name).exists()
     assert list(write_vectors([document, document], tmp_path / "v.json", None)) == []
     assert len(json.loads((tmp_path / "v.json").read_text("utf-8"))) == 2

@@ -28,7 +28,7 @@ from tests.support.programs.stages import emitted, program_of, shipped
 
 BOXES = proofs(Options(solver="boxes"))
 APPROACH = "tables/examples/approach.rcs"
-SAMPLE = 60
+SAMPLE = 100
 """Of the mutants of a shipped table; `rcsc test --mutants -1` judges them all."""
 
 
