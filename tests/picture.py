@@ -56,13 +56,7 @@ def masked(text: str) -> str:
 
 def finding() -> str:
     """What `rcsc check` says of a table with a gap."""
-    console = Console(
-        record=True,
-        width=WIDTH,
-        file=io.StringIO(),
-        force_terminal=True,
-        no_color=False,
-    )
+    console = Console(record=True, width=WIDTH, file=io.StringIO(), force_terminal=True, no_color=False)
     shown = " ".join(word for word in CHECK if word not in ("--color", "always", "--no-cache"))
     console.print(Text(f"$ rcsc {shown}", style="bold"))
     console.print(Text.from_ansi(printed(CHECK)[0]), no_wrap=True, crop=True)

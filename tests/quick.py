@@ -8,6 +8,7 @@ a room that has no such file, the least costly tests of one: to read a file cost
 import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -23,8 +24,9 @@ def quick(name: str, chosen: Iterable[str]) -> bool:
     return not {name, name.partition("::")[0]}.isdisjoint(chosen)
 
 
+@cache
 def chosen() -> frozenset[str]:
-    """Return the list."""
+    """Return the list; read once, as every file is held against it."""
     return frozenset(LIST.read_text(encoding="utf-8").split())
 
 

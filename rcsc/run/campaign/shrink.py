@@ -4,8 +4,8 @@ In: an episode and what it means to fail. Out: an episode that fails, from which
 elements, larger runs of them first; then numbers move toward what is usual: a field's default, a window of one tick.
 
 It stands beside Hypothesis, which shrinks what it drew and not an episode: of the docking robot whose drive forgets that it began anew,
-an episode of eight orders and faults becomes one of two in 23 runs here, stays at eight in 34 where Hypothesis draws its seed, and
-comes to five in 65 where it draws choice by choice.
+an episode of eight orders and faults becomes one of two in 23 runs here, and stays at eight in 34 where Hypothesis draws its seed. An
+episode that Hypothesis drew choice by choice, another one, came to five in 65.
 
 Source: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input (2002), for removing by halves.
 """

@@ -342,6 +342,7 @@ class Loop:
                 self._seen.staged.update((level.name, table, line) for table, line in before)
         cycle.tick, cycle.ran = system.tick, ran
         self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
+        # all watch before any finding is made: a finding names the trusted facts that this cycle broke, too
         for broken in [broken for watcher in self.watching for broken in watcher.watch(cycle)]:
             self._find(broken, system.tick)
         for level in ran:

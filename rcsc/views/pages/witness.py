@@ -26,7 +26,7 @@ class RunWitness:
         pictures: Functions that draw the world outside as an SVG document, by kind.
         film: Whether pictures for a report are kept.
         seconds: Spent on watching.
-        drawn: Variables, `level.variable`, that the report draws at first; none where the system's displays say so.
+        drawn: Variables, `level.variable`, that the report draws at first; empty where the log decides.
     """
 
     run: ScriptedRun
@@ -36,7 +36,7 @@ class RunWitness:
     frames: list[CellPicture] = field(default_factory=list)
     drawn: Sequence[str] = ()
     _row: int = -1
-    _drawn: int = -FRAMES_APART
+    _filmed: int = -FRAMES_APART
 
     def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:  # noqa: ARG002  # as all who watch
         """Watch a cycle that has just ended."""
@@ -53,10 +53,10 @@ class RunWitness:
 
     def _film(self, system: System) -> None:
         at = 0 if self.run.operator is None else self.run.operator.at
-        since = system.tick - self._drawn
+        since = system.tick - self._filmed
         drawing = next(reversed(list(self.pictures.values())), None)
         if drawing is not None and (since >= LONG_APART or (at != self._row and since >= FRAMES_APART)):
-            self._drawn, self._row = system.tick, at
+            self._filmed, self._row = system.tick, at
             self.frames.append(CellPicture(system.tick, self._caption(at), drawing()))
 
     def _caption(self, at: int) -> str:

@@ -155,9 +155,10 @@ def _summary(log: Log) -> None:
     if (shown := log.finding) is not None:
         where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
         click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")
+    tables = coverage(log)
     for level in log.levels:
         _summed(level)
-        for table in coverage(log):
+        for table in tables:
             if table.level == level.name:
                 ran = len(table.lines) - len(table.never)
                 click.echo(f"  table {table.table}: {ran} of {len(table.lines)} lines ran")
