@@ -209,6 +209,22 @@ def test_what_is_wrong_is_seen(tmp_path: Path) -> None:
             assert bool(found) is bool(said), inside
 
 
+def test_a_style_that_the_policy_forbids_is_heard(tmp_path: Path) -> None:
+    """Whether the page's text has it or a script sets it."""
+    policy = (
+        "<meta http-equiv=content-security-policy content=\"style-src 'self'; script-src 'unsafe-inline'\">"
+    )
+    file = tmp_path / "page.html"
+    with Seat(WIDE, HIGH) as bare:
+        for inside in (
+            "<p style='color: red'>",
+            "<script>document.body.setAttribute('style', 'color: red')</script>",
+        ):
+            file.write_text(f"<!doctype html>{policy}<body>{inside}", encoding="utf-8")
+            bare.open(file.as_uri())
+            assert ["Applying inline style" in said for said in bare.said] == [True], inside
+
+
 def test_scrubbing_shows_the_last_tick_and_keeps_nothing(seat: Seat) -> None:
     seat.click("#views button[data-view=run]")
     seat.press("escape")

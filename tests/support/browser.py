@@ -165,7 +165,10 @@ class Browser:
         if event.get("method") == "Runtime.exceptionThrown":
             self.said.append(str(event["params"]["exceptionDetails"]))
         if event.get("method") == "Log.entryAdded":
-            self.said.append(event["params"]["entry"]["text"])
+            entry = event["params"]["entry"]
+            # What the page's text or scripts do has a line. The browser's own editing, of a tabulator typed into a text, has none.
+            if "lineNumber" in entry or not entry["text"].startswith("Applying inline style"):
+                self.said.append(f"{entry['text']} ({entry.get('url', '')}:{entry.get('lineNumber', '')})")
 
     def _answer(self) -> dict[str, Any]:
         while b"\0" not in self._held:

@@ -42,6 +42,7 @@ export function mount(root, bus) {
       }
       told += 1;
       Object.assign(tracks, { era: answer.era, to: answer.to, first: answer.first, last: answer.last, marks: answer.marks });
+      if (view.whole) fit(); // at once: what is pressed before the next frame is meant of these ticks
       if (answer.to < answer.last) again = true;
     }
     if (again) { again = false; fetchTracks(); }
@@ -70,6 +71,7 @@ export function mount(root, bus) {
     for (const letter of text) hash = (hash * 31 + letter.codePointAt(0)) % 360;
     return dark() ? `hsl(${hash} 28% ${at % 2 ? 27 : 22}%)` : `hsl(${hash} 55% ${at % 2 ? 88 : 82}%)`;
   };
+  const fit = () => Object.assign(view, { from: tracks.first, to: tracks.first + Math.max(LEAST, tracks.last - tracks.first) });
   const x = (tick) => (tick - view.from) / (view.to - view.from) * across;
   const tickAt = (pixel) => view.from + pixel / canvas.clientWidth * (view.to - view.from);
 
@@ -89,8 +91,7 @@ export function mount(root, bus) {
       canvas.height = Math.round(high * ratio);
       canvas.style.height = `${high}px`;
     }
-    const span = Math.max(LEAST, tracks.last - tracks.first);
-    if (view.whole) Object.assign(view, { from: tracks.first, to: tracks.first + span });
+    if (view.whole) fit();
     else if (bus.selection.follow && bus.selection.tick !== null && bus.selection.tick > view.to) {
       const width = view.to - view.from;
       Object.assign(view, { to: bus.selection.tick + width * 0.05, from: bus.selection.tick - width * 0.95 });
@@ -195,7 +196,7 @@ export function mount(root, bus) {
 
   function spoken() {
     const run = bus.latest("run"), { tick } = bus.selection;
-    if (!run?.open || tick === null) { readout.textContent = ""; return; }
+    if (!run?.open || tick === null || !told) { readout.textContent = ""; return; }
     const lines = run.levels.map(({ name }) => { const stands = standing(name, tick).change; return stands ? `${name} ${stands[1]} ${stands[2] || "-"}` : name; });
     const here = tracks.marks.filter((mark) => mark.tick === tick).map(({ text }) => text);
     const text = `tick ${tick} of ${run.last}, ${(tick * run.tick_ms / 1000).toFixed(2)} s${here.length ? `; here: ${here.join("; ")}` : ""}${tracks.to < tracks.last ? `; reading which lines ran: tick ${Math.max(0, tracks.to)} of ${tracks.last}` : ""}`;
@@ -210,6 +211,7 @@ export function mount(root, bus) {
 
   let dragging = null;
   slider.addEventListener("pointerdown", (event) => {
+    if (!told) return; // nothing is drawn yet that could be meant
     slider.setPointerCapture(event.pointerId);
     slider.focus({ preventScroll: true });
     dragging = event.shiftKey || event.button === 1 ? { from: view.from, to: view.to, x: event.offsetX } : "scrub";
