@@ -294,13 +294,8 @@ def test_grid_and_graph_follow_a_level_through_its_tables(tmp_path: Path) -> Non
 
 def _somewhere(seat: Seat, places: random.Random) -> int:
     """Click somewhere into the time line; the tick."""
-    left, top, width = seat.value(
-        "(({ left, top, width }) => [left, top, width])(document.querySelector('#time [role=slider]').getBoundingClientRect())"
-    )
     before = seat.tick()
-    x = left + places.uniform(0.05, 0.95) * width
-    seat.mouse("mousePressed", x, top + 8)
-    seat.mouse("mouseReleased", x, top + 8, 0)
+    seat.click_time(places.uniform(0.05, 0.95))
     seat.wait(f"Number(document.querySelector('#time [role=slider]').ariaValueNow) !== {before}")
     return seat.tick()
 

@@ -46,13 +46,8 @@ def test_every_tick_is_as_the_log_has_it(which: int, made: tuple[Path, Path, Log
     opened(seat, logged if which else run)
     # until the line is drawn, what is pressed on it is not where the run's tick will be
     seat.wait(f"document.querySelector('#time [role=slider]').ariaValueMax === '{log.last}'")
-    left, top, width = seat.value(
-        "(({ left, top, width }) => [left, top, width])(document.querySelector('#time [role=slider]').getBoundingClientRect())"
-    )
     for tick in random.Random(which).sample(range(2, log.last), 8):  # noqa: S311  # the same each time
-        x = left + width * tick / log.last
-        seat.mouse("mousePressed", x, top + 5)
-        seat.mouse("mouseReleased", x, top + 5, 0)
+        seat.click_time(tick / log.last)
         # what was shown before stays until the page has drawn what is pointed at
         seat.wait(
             f"Math.abs(document.querySelector('#time [role=slider]').ariaValueNow - {tick}) <= 1"
@@ -72,6 +67,22 @@ def test_every_tick_is_as_the_log_has_it(which: int, made: tuple[Path, Path, Log
         seat.until("#curves .legend", f"drive.speed_mm_s = {held[speed]}")
     assert seat.value("performance.getEntriesByType('resource').length") == 0
     assert seat.said == []
+
+
+FROZEN = "window.held = []; window.drawn = requestAnimationFrame; window.requestAnimationFrame = (one) => held.push(one);"
+"""Has nothing drawn until somebody lets it."""
+
+
+def test_a_press_before_the_first_picture_leads_where_it_is(made: tuple[Path, Path, Log]) -> None:
+    """The line is as long as the run as soon as that is known, not only once it is drawn."""
+    with Seat(WIDE, HIGH) as one:
+        one.begin_with(FROZEN)
+        one.open(made[0].as_uri())
+        one.wait("document.querySelector('#moment').dataset.tick")
+        one.click_time(36 / made[2].last)
+        one.value("(window.requestAnimationFrame = window.drawn, held.forEach((draw) => draw()))")
+        one.wait("document.querySelector('#time [role=slider]').ariaValueNow")
+        assert abs(one.tick() - 36) <= 1
 
 
 def test_it_is_looked_at_by_keys_alone(made: tuple[Path, Path, Log], seat: Seat) -> None:

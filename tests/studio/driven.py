@@ -137,6 +137,14 @@ class Seat(Browser):
         })"""
         return self.value(f"{still}.then(() => {expression})")
 
+    def click_time(self, along: float) -> None:
+        """Click the time line: at 0 its beginning, at 1 its end."""
+        left, top, width = self.value(
+            "(({ left, top, width }) => [left, top, width])(document.querySelector('#time [role=slider]').getBoundingClientRect())"
+        )
+        self.mouse("mousePressed", left + along * width, top + 8)
+        self.mouse("mouseReleased", left + along * width, top + 8, 0)
+
     def tick(self) -> int:
         """The tick that the time line shows."""
         return int(

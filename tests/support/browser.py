@@ -90,6 +90,10 @@ class Browser:
         assert not self._tell("Page.navigate", url=address).get("errorText")
         self.wait("document.readyState === 'complete'")
 
+    def begin_with(self, script: str) -> None:
+        """Runs a script in every page from now on, before any of the page's own."""
+        self._tell("Page.addScriptToEvaluateOnNewDocument", source=script)
+
     def hold_back(self, pattern: str) -> None:
         """Has what is asked of addresses like this wait for `let_go`, as on a slow machine."""
         self._tell("Fetch.enable", patterns=[{"urlPattern": pattern}])

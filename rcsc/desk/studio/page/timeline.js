@@ -196,7 +196,7 @@ export function mount(root, bus) {
 
   function spoken() {
     const run = bus.latest("run"), { tick } = bus.selection;
-    if (!run?.open || tick === null || !told) { readout.textContent = ""; return; }
+    if (!run?.open || tick === null || tracks.era < 0) { readout.textContent = ""; return; }
     const lines = run.levels.map(({ name }) => { const stands = standing(name, tick).change; return stands ? `${name} ${stands[1]} ${stands[2] || "-"}` : name; });
     const here = tracks.marks.filter((mark) => mark.tick === tick).map(({ text }) => text);
     const text = `tick ${tick} of ${run.last}, ${(tick * run.tick_ms / 1000).toFixed(2)} s${here.length ? `; here: ${here.join("; ")}` : ""}${tracks.to < tracks.last ? `; reading which lines ran: tick ${Math.max(0, tracks.to)} of ${tracks.last}` : ""}`;
@@ -211,7 +211,7 @@ export function mount(root, bus) {
 
   let dragging = null;
   slider.addEventListener("pointerdown", (event) => {
-    if (!told) return; // nothing is drawn yet that could be meant
+    if (tracks.era < 0) return; // nothing is drawn yet of this run that could be meant
     slider.setPointerCapture(event.pointerId);
     slider.focus({ preventScroll: true });
     dragging = event.shiftKey || event.button === 1 ? { from: view.from, to: view.to, x: event.offsetX } : "scrub";
