@@ -180,8 +180,9 @@ def test_whatever_is_pressed_written_and_clicked_raises_nothing(seed: int, tmp_p
         for _ in range(250):
             match hand.randrange(6):
                 case 0:
-                    one.click(f"#views button[data-view={hand.choice(VIEWS)}]")
-                    one.wait("document.querySelector('main')")
+                    one.value(
+                        f"document.querySelector('#views button[data-view={hand.choice(VIEWS)}]').click()"
+                    )
                 case 1:
                     one.write(hand.choice(WRITTEN))
                 case 2 | 3:
@@ -289,3 +290,23 @@ def test_curves_follow_what_the_tables_choose_until_somebody_takes_one_away(tmp_
         seat.press("escape", "space")
         seat.until("#state", "paused at")
         seat.wait(f"{legends} === 'drive.lateral_mm drive.speed_mm_s'")
+
+
+def test_what_moves_before_it_is_pressed_is_aimed_at_again(tmp_path: Path) -> None:
+    """And what has come to its place does not feel the press; what is replaced while it is pressed is not clicked."""
+    file = tmp_path / "page.html"
+    file.write_text(
+        "<!doctype html><body style='margin: 0'><div id=space></div><button id=one>one</button><br><button id=two>two</button>"
+        "<script>window.felt = ''; const space = document.querySelector('#space');"
+        "addEventListener('mousemove', () => { space.style.height = '21.5px'; }, { once: true });"
+        "one.onclick = () => { felt += 'one '; }; two.onclick = () => { felt += 'two '; };"
+        "</script>",
+        encoding="utf-8",
+    )
+    with Seat(WIDE, HIGH) as bare:
+        bare.open(file.as_uri())
+        bare.click("#two")
+        assert bare.value("felt") == "two "
+        bare.value("one.onmousedown = () => one.replaceWith(document.createElement('hr')), 0")
+        bare.click("#one")
+        assert bare.value("felt") == "two "

@@ -4,13 +4,14 @@ import contextlib
 import json
 import random
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rcsc.desk.shell.opening import Opening
 from tests.studio.served import serving
-from tests.support.browser import Browser
+from tests.support.browser import PATIENCE_S, Browser
 
 DOCK = Path(__file__).parents[1] / "data" / "dock"
 WIDE, HIGH = 1280, 800
@@ -24,6 +25,27 @@ KEYS = {
     "pageup": ("PageUp", 33, ""), "pagedown": ("PageDown", 34, ""),
 }  # fmt: skip
 """Keys with names: what the page calls one, its number, and what it types."""
+
+_AIM = """((one) => {
+  if (!one) return null;
+  one.scrollIntoView({ block: 'nearest', inline: 'nearest' });
+  let hit = null; // not known before the press
+  const kinds = ['pointerdown', 'mousedown', 'pointerup', 'mouseup', 'click'];
+  const guard = (event) => {
+    hit ??= event.composedPath().includes(FOUND);
+    if (hit) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  };
+  for (const kind of kinds) addEventListener(kind, guard, true);
+  window.aimed = () => {
+    for (const kind of kinds) removeEventListener(kind, guard, true);
+    return hit ?? true; // a press that leads to another page is not told here
+  };
+  const { left, top, width, height } = one.getBoundingClientRect();
+  return [left + width / 2, top + height / 2];
+})(FOUND)"""
+"""Where an element is to be pressed; until `aimed` is asked, a press on anything else is not felt by it."""
 
 
 def dock(folder: Path, *edits: tuple[str, str]) -> Path:
@@ -77,16 +99,26 @@ class Seat(Browser):
         self._tell("Input.insertText", text=text)
 
     def click(self, element: str) -> None:
-        """Clicks, as a mouse does, the middle of the first element that an expression or a selector names; waits for it to be seen."""
+        """Clicks, as a mouse does, the middle of the first element that an expression or a selector names; waits for it to be seen.
+
+        What moves away before it is pressed is aimed at again, as a user would; a press on it counts, whatever becomes of it.
+        """
         found = element if element.startswith("(") else f"document.querySelector({json.dumps(element)})"
+        until = time.monotonic() + PATIENCE_S
+        while not self._clicked(found):
+            assert time.monotonic() < until, f"something else is where {element} is"
+
+    def _clicked(self, found: str) -> bool:
+        """Clicks where an element is; False where the press came to something else, which has not felt it."""
         self.wait(f"{found}?.checkVisibility()")
-        self.value(f"{found}.scrollIntoView({{block: 'nearest', inline: 'nearest'}})")
-        x, y = self.value(
-            f"(({{left, top, width, height}}) => [left + width / 2, top + height / 2])({found}.getBoundingClientRect())"
-        )
+        aim = self.value(_AIM.replace("FOUND", found))
+        if aim is None:
+            return False
+        x, y = aim
         self.mouse("mouseMoved", x, y, 0)
         self.mouse("mousePressed", x, y)
         self.mouse("mouseReleased", x, y)
+        return bool(self.value("window.aimed?.() ?? true"))
 
     def mouse(self, kind: str, x: float, y: float, buttons: int = 1) -> None:
         """Moves the mouse, or presses or releases its left button."""
