@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from rcsc.front.commands import run
-from tests.quick import chosen, quick
+from tests.sets import THOROUGH, chosen, quick
 
 # A shell's `&` begins a command with SIGINT ignored, which all its children inherit; tests send it to them.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -100,30 +100,46 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if file not in {name.partition("::")[0] for name in chosen()} else None
 
 
+def _alone(config: pytest.Config) -> bool:
+    """Whether nothing is asked for by its folder, name, mark or a word of it: then what is thorough is not meant."""
+    whole = [Path(__file__).parent] == [
+        Path(config.invocation_params.dir, one).resolve() for one in config.args
+    ]
+    return whole and not config.getoption("markexpr") and not config.getoption("keyword")
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` is asked
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Marks what is quick (`tests.quick`) and puts it first; leaves out what needs a tool that is not here, as the run's end says.
+    """Marks what is quick or thorough (`tests.sets`) and puts what is quick first; leaves out what is thorough where nothing is asked for.
 
-    The tools are no Python packages. `.ci/run` installs them, and fails where it cannot; its summary names what not every release has.
+    What needs a tool that is not here is left out, too, as the run's end says. The tools are no Python packages: `.ci/run` installs them,
+    and fails where it cannot; its summary names what not every release has.
     """
-    quick_ones = chosen()
+    quick_ones, thorough_ones = chosen(), chosen(THOROUGH)
     for item in items:
-        if quick(item.nodeid.partition("[")[0].removeprefix("tests/"), quick_ones):
+        name = item.nodeid.removeprefix("tests/")
+        if quick(name.partition("[")[0], quick_ones):
             item.add_marker("quick")
+        if name in thorough_ones:
+            item.add_marker("thorough")
     # What most changes break shows in the first minute.
     items.sort(key=lambda item: "quick" not in item.keywords)
-    left_out = [
+    alone = _alone(config)
+    left_out = {
         item
         for item in items
-        if any(_missing(tool) for mark in item.iter_markers("needs") for tool in mark.args)
-    ]
+        if (alone and "thorough" in item.keywords)
+        or any(_missing(tool) for mark in item.iter_markers("needs") for tool in mark.args)
+    }
     if left_out:
-        config.hook.pytest_deselected(items=left_out)
+        config.hook.pytest_deselected(items=[item for item in items if item in left_out])
         items[:] = [item for item in items if item not in left_out]
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Names the tools that are not here."""
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Says what was left out: what is thorough, and what needs tools that are not here."""
+    if _alone(config):
+        terminalreporter.write_line("left out: what takes long; `pytest -m thorough` runs it")
     missing = sorted(tool for tool in TOOLS if _missing(tool))
     if missing:
         terminalreporter.write_line(f"NOT RUN: tests that need {', '.join(missing)} (packages of Debian's)")

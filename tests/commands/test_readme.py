@@ -123,7 +123,6 @@ def ends_with(command: str, monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("kept_proofs")
 @pytest.mark.parametrize("guide", GUIDES)
 def test_the_commands_of_a_guide_end_as_it_says(

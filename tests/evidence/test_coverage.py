@@ -14,7 +14,7 @@ from rcsc.views.evidence.kind import Subject
 from tests.evidence.subjects import EVERYTHING, subject_of
 from tests.support.programs.examples import EXTERN, LASTING, RELATED, STOPS
 
-pytestmark = [pytest.mark.needs("clang-19", "llvm-cov-19"), pytest.mark.slow]
+pytestmark = pytest.mark.needs("clang-19", "llvm-cov-19")
 
 
 def edited_c(subject: Subject, right: str, wrong: str) -> Subject:

@@ -146,7 +146,6 @@ def planted_beside(module: Path) -> None:
     place.write_bytes(head + code)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 def test_each_level_in_a_process_does_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["run", "dock", "--no-compile", "--executor", "python", "--processes", "--rate", "20"]) == 0

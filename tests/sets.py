@@ -1,0 +1,120 @@
+"""Which tests are quick, and which thorough: `python -m tests.sets JUNIT` chooses both anew, from what a run of all took.
+
+`pytest -m quick` runs some of every room, in less than a minute of two idle cores. They are whole files, the least costly first; of a room
+that has no such file, the least costly tests of one: to read a file costs as much as a hundred such tests. `pytest -m thorough` runs what
+takes long. Of every file the ordinary run, `pytest` alone, has the least costly cases, up to `MOST_OF_A_FILE_S`, and what is `KEPT`. The
+rest is thorough, and runs where its folder, file or name is asked for. `pytest -m "thorough or not thorough" --junitxml=JUNIT` runs all.
+
+The lists are `quick.txt` and `thorough.txt`; `conftest.py` gives each test on them its mark, and reads no other file where quick tests
+alone are asked for.
+"""
+
+import sys
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+QUICK, THOROUGH = (Path(__file__).with_name(f"{name}.txt") for name in ("quick", "thorough"))
+MOST_S = 16.0
+"""Processor time that all may take, but for what it takes to find them."""
+MOST_OF_A_ROOM_S = 0.8
+"""Of tests of a room none of whose files is on the list."""
+MOST_OF_A_FILE_S = 8.0
+"""Time that the cases of a file may take in the ordinary run."""
+KEPT = frozenset(
+    {
+        "commands/test_readme.py::test_the_commands_of_a_guide_end_as_it_says[README.md]",
+        "commands/test_tutorial.py::test_whoever_follows_the_tutorial_sees_what_it_shows",
+        "compose/test_hierarchies.py::test_the_proof_and_the_enumeration_agree_of_random_hierarchies",
+        "compose/test_protocol.py::test_every_obligation_of_a_docking_robot_is_stated_and_proved",
+    }
+)
+"""What every run has, whatever it takes: what a user does first, the judge of the proofs, and a robot's proof as a whole."""
+
+
+def quick(name: str, chosen: Iterable[str]) -> bool:
+    """Whether a test, by its path below `tests` and its function, is on the list."""
+    return not {name, name.partition("::")[0]}.isdisjoint(chosen)
+
+
+@cache
+def chosen(of: Path = QUICK) -> frozenset[str]:
+    """Return a list; read once, as every test is held against it."""
+    return frozenset(of.read_text(encoding="utf-8").splitlines())
+
+
+def choose_thorough(took_s: Mapping[str, float]) -> list[str]:
+    """Choose cases: of each file all but the least costly.
+
+    Args:
+        took_s: What each case took, by `ROOM/FILE.py::FUNCTION[CASE]`.
+    """
+    found: list[str] = []
+    left_s: dict[str, float] = defaultdict(lambda: MOST_OF_A_FILE_S)
+    for name, each_s in sorted(took_s.items(), key=lambda one: (one[1], one[0])):
+        file = name.partition("::")[0]
+        left_s[file] -= each_s
+        if left_s[file] < 0 and name not in KEPT:
+            found.append(name)
+    return sorted(found)
+
+
+def choose(took_s: Mapping[str, float]) -> list[str]:
+    """Choose quick files, and of each room without one the functions of the file that has most such.
+
+    Args:
+        took_s: What each function took, all its cases together, by `ROOM/FILE.py::FUNCTION`.
+    """
+    files: dict[str, float] = defaultdict(float)
+    for name, each_s in took_s.items():
+        files[name.partition("::")[0]] += each_s
+    found, sum_s = [], 0.0
+    for name, each_s in sorted(files.items(), key=lambda one: (one[1], one[0])):
+        sum_s += each_s
+        if sum_s > MOST_S:
+            break
+        found.append(name)
+    rooms = {name.split("/")[0] for name in found}
+    of_room: dict[str, list[str]] = defaultdict(list)
+    for file in files:
+        cheap = _cheap({name: each_s for name, each_s in took_s.items() if name.startswith(f"{file}::")})
+        of_room[file.split("/")[0]] = max(of_room[file.split("/")[0]], cheap, key=len)
+    found += [name for room, cheap in of_room.items() if room not in rooms for name in cheap]
+    return sorted(found)
+
+
+def _cheap(took_s: Mapping[str, float]) -> list[str]:
+    """The least costly functions of a file."""
+    found, left_s = [], MOST_OF_A_ROOM_S
+    for name, each_s in sorted(took_s.items(), key=lambda one: (one[1], one[0])):
+        left_s -= each_s
+        if left_s >= 0:
+            found.append(name)
+    return found
+
+
+def measured(junit: Path) -> dict[str, float]:
+    """What each case took, of a run's record: by `ROOM/FILE.py::FUNCTION[CASE]`."""
+    took_s: dict[str, float] = defaultdict(float)
+    for case in ET.parse(junit).getroot().iter("testcase"):  # noqa: S314 - of our own run
+        parts = str(case.get("classname")).split(".")
+        at = next(place for place, part in enumerate(parts) if part.startswith("test_"))
+        name = "::".join(["/".join(parts[1 : at + 1]) + ".py", *parts[at + 1 :], str(case.get("name"))])
+        took_s[name] += float(case.get("time", 0))
+    return took_s
+
+
+def by_function(took_s: Mapping[str, float]) -> dict[str, float]:
+    """What each function took, all its cases together."""
+    found: dict[str, float] = defaultdict(float)
+    for name, each_s in took_s.items():
+        found[name.partition("[")[0]] += each_s
+    return found
+
+
+if __name__ == "__main__":
+    of_cases = measured(Path(sys.argv[1]))
+    for path, names in ((QUICK, choose(by_function(of_cases))), (THOROUGH, choose_thorough(of_cases))):
+        path.write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
