@@ -14,13 +14,16 @@ from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import Cell, stub_of
 from rcsc.lang.written.tables import (
     RowText,
+    WrittenPart,
     WrittenTable,
     cells_of,
+    dashes,
     fresh_name,
     joined_cells,
     pieces,
     table_of,
     whole_line,
+    written_cell,
 )
 
 _MEANT = re.compile(r"did you mean `([^`]+)`\?$")
@@ -76,13 +79,19 @@ def spliced(text: str, splices: Sequence[Splice]) -> str:
 
 def _splices(text: str, table: WrittenTable, change: Change) -> list[Splice] | None:
     if change.place is ChangeKind.LINE:
-        return _new_line(text, table, change)
+        if not all(part.lines for part in table.parts):
+            return None
+        name = fresh_name(
+            {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
+        )
+        return new_line(text, table, max(len(part.lines) for part in table.parts), name, change.texts)
     at, rows = _line(table, change.line)
     if not rows:
         return None
     match change.place:
         case ChangeKind.CELL:
-            return _cell(text, table, at, change.column, change.texts[0])
+            found = written_cell(table, at, change.column)
+            return None if found is None else over(text, found[1], change.texts[0], found[0])
         case ChangeKind.SAME:
             stub = joined_cells(rows).conditions[0]
             same = [cell.text for cell in stub_of(stub).same]
@@ -104,18 +113,6 @@ def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
     return 0, ()
 
 
-def _cell(text: str, table: WrittenTable, line: int, column: int, new: str) -> list[Splice] | None:
-    """Write a condition, in the part of the table that has its column."""
-    for part in table.parts:
-        many = len(joined_cells(part.heading).conditions) - 1
-        if column < many and line < len(part.lines):
-            rows = part.lines[line]
-            cells = joined_cells(rows).conditions
-            return over(text, cells[column + 1], new, rows) if column + 1 < len(cells) else None
-        column -= many
-    return None
-
-
 def over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[Splice]:
     """Write a cell into the first of its rows, and leave out rows that have nothing else, a comment neither."""
     first, *more = pieces(cell)
@@ -127,22 +124,44 @@ def over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[Splic
     return splices
 
 
-def _new_line(text: str, table: WrittenTable, change: Change) -> list[Splice] | None:
-    """Write a line after the last, in each part of the table."""
-    names = {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
-    name = fresh_name(names)
-    waiting, splices = list(change.texts), []
-    end = "\r\n" if "\r\n" in text else "\n"
-    for part in table.parts:
-        if not part.lines:
-            return None
-        heading = joined_cells(part.heading)
-        many = len(heading.conditions) - 1
-        mine, waiting = waiting[:many], waiting[many:]
-        last = part.lines[-1][-1]
-        indent = text[whole_line(text, last)[0] : last.start]
-        actions = "".join("  |" for _ in heading.actions)
-        row = f"{indent}| {' | '.join((name, *mine))} ||{actions}"
-        past = last.past
-        splices.append((past, past, f"{end}{row}"))
+def new_line(text: str, table: WrittenTable, at: int, stub: str, cells: Sequence[str]) -> list[Splice]:
+    """Write a line before a position, in each part of the table.
+
+    Args:
+        text: Of the file.
+        table: That gets the line.
+        at: From 0; the number of lines for the last.
+        stub: The line's name, and its marks: those are written in the first part.
+        cells: Conditions of all parts first, then actions; those that are missing are empty.
+    """
+    headings = [joined_cells(part.heading) for part in table.parts]
+    column, action = 0, sum(len(heading.conditions) - 1 for heading in headings)
+    every = (*cells, *("",) * (action + sum(len(heading.actions) for heading in headings) - len(cells)))
+    splices = []
+    for part, heading in zip(table.parts, headings, strict=True):
+        past, done = column + len(heading.conditions) - 1, action + len(heading.actions)
+        row = row_text((stub, *every[column:past]), every[action:done])
+        splices.append(_inserted(text, table, part, at, row))
+        column, action, stub = past, done, stub_of(Cell(stub, "", 0)).name.text
     return splices
+
+
+def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> Splice:
+    """Return the splice that writes a row before the line at a position of a part."""
+    end = "\r\n" if "\r\n" in text else "\n"
+    if at < len(part.lines):
+        start, _ = whole_line(text, part.lines[at][0])
+        return start, start, f"{text[start : part.lines[at][0].start]}{row}{end}"
+    last = table.rows_of(part)[-1]
+    indent = text[whole_line(text, last)[0] : last.start]
+    heading = joined_cells(part.heading)
+    dashed = row_text(["---"] * len(heading.conditions), ["---"] * len(heading.actions), "")
+    more = "" if part.lines or dashes(last) else f"{end}{indent}{dashed}"
+    return last.past, last.past, f"{more}{end}{indent}{row}"
+
+
+def row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " ") -> str:
+    """Return a row of cells, the first of which is the line's name."""
+    left = "|".join(f"{blank}{cell}{blank}" for cell in conditions)
+    right = "".join(f"{blank}{cell}{blank}|" for cell in actions)
+    return f"|{left}||{right}"

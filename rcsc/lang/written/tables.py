@@ -132,6 +132,32 @@ def joined_cells(rows: Sequence[RowText], file: str = "") -> Cells:
     return Cells(tuple(every[:split]), tuple(every[split:]))
 
 
+def written_cell(table: WrittenTable, line: int, column: int) -> tuple[tuple[RowText, ...], Cell] | None:
+    """Return the rows of a line and one of its cells; None where the line ends before it, or is not in that part.
+
+    Args:
+        table: Its text.
+        line: From 0; -1 is the heading.
+        column: From 0; conditions of all parts are counted first, then actions.
+    """
+    headings = [joined_cells(part.heading) for part in table.parts]
+    conditions = sum(len(heading.conditions) - 1 for heading in headings)
+    action = column >= conditions
+    at = column - conditions if action else column
+    for part, heading in zip(table.parts, headings, strict=True):
+        many = len(heading.actions) if action else len(heading.conditions) - 1
+        if at >= many:
+            at -= many
+        elif line < len(part.lines):
+            rows = part.heading if line < 0 else part.lines[line]
+            cells = joined_cells(rows)
+            own = cells.actions if action else cells.conditions[1:]
+            return (rows, own[at]) if at < len(own) else None
+        else:
+            return None
+    return None
+
+
 def pieces(cell: Cell) -> list[tuple[int, int]]:
     """Return start and end of each piece of a cell; an empty cell has one piece, of no length.
 

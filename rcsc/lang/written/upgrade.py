@@ -25,15 +25,12 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.lang.model import Enum, Program, VariableName
 from rcsc.lang.project import Loaded
 from rcsc.lang.resolve import closure, resolve
-from rcsc.lang.restart import Fixed
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, SEEN, STATUS, Fixed
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr, spell_field, spell_type
 from rcsc.lang.written.starts import started_otherwise, written_out
 
-_NUMBER, _COMMAND = "inc_command", "input_command"
-_ECHO, _ECHOED, _STATUS = "inc_command_echo", "ref_command_echo", "status_report"
-_SEEN = "inc_command_seen"
-_BY_HAND = (_SEEN, _NUMBER, _ECHO)
+_BY_HAND = (SEEN, NUMBER, ECHO)
 """Leaves that a level with declared roles does not assign itself."""
 
 Trees: TypeAlias = Mapping[str, tree.File]
@@ -234,20 +231,20 @@ def _buffers(declarations: Sequence[tree.Declaration]) -> Iterator[_Buffer]:
 
 
 def _superior(buffers: Sequence[_Buffer], members: Mapping[str, tuple[str, ...]]) -> Iterator[str]:
-    orders = [b for b in buffers if b.declared.kind == "input" and b.has(_NUMBER, _COMMAND)]
-    reports = [b for b in buffers if b.declared.kind == "output" and b.has(_ECHO, _ECHOED, _STATUS)]
+    orders = [b for b in buffers if b.declared.kind == "input" and b.has(NUMBER, COMMAND)]
+    reports = [b for b in buffers if b.declared.kind == "output" and b.has(ECHO, ECHOED, STATUS)]
     if len(orders) == len(reports) == 1:
         yield from _link("superior", orders[0], reports[0], members)
         yield "serves superior : superior_link"
 
 
 def _subordinates(buffers: Sequence[_Buffer], members: Mapping[str, tuple[str, ...]]) -> Iterator[str]:
-    reports = {b.name: b for b in buffers if b.declared.kind == "input" and b.has(_ECHO, _ECHOED, _STATUS)}
+    reports = {b.name: b for b in buffers if b.declared.kind == "input" and b.has(ECHO, ECHOED, STATUS)}
     for order in buffers:
         peer = order.name.removeprefix("to_")
         if (
             order.declared.kind == "output"
-            and order.has(_NUMBER, _COMMAND)
+            and order.has(NUMBER, COMMAND)
             and peer in reports
             and peer != order.name
         ):
@@ -258,7 +255,7 @@ def _subordinates(buffers: Sequence[_Buffer], members: Mapping[str, tuple[str, .
 def _link(
     peer: str, order: _Buffer, report: _Buffer, members: Mapping[str, tuple[str, ...]]
 ) -> Iterator[str]:
-    command, status = order.type_of(_COMMAND), report.type_of(_STATUS)
+    command, status = order.type_of(COMMAND), report.type_of(STATUS)
     said = " ".join(
         f"{word} {_member(word, members.get(status, ()))}" for word in ("done", "failed", "executing")
     )
@@ -266,8 +263,8 @@ def _link(
     yield f"  command : {command} rest {next(iter(members.get(command, ())), '?')}"
     yield f"  status : {status} {said}"
     for word, fields in (
-        ("order", order.rest(_NUMBER, _COMMAND)),
-        ("report", report.rest(_ECHO, _ECHOED, _STATUS)),
+        ("order", order.rest(NUMBER, COMMAND)),
+        ("report", report.rest(ECHO, ECHOED, STATUS)),
     ):
         if fields:
             yield f"  {word} {{"

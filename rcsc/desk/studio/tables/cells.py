@@ -12,9 +12,8 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.syntax.rows import Cell, Cells, stub_of
-from rcsc.lang.written.changes import Splice, formatted, over, spliced
+from rcsc.lang.written.changes import Splice, formatted, new_line, over, row_text, spliced
 from rcsc.lang.written.tables import (
-    RowText,
     WrittenPart,
     WrittenTable,
     cells_of,
@@ -24,6 +23,7 @@ from rcsc.lang.written.tables import (
     pieces,
     table_of,
     whole_line,
+    written_cell,
 )
 
 MOST_CELLS = 20_000
@@ -150,16 +150,7 @@ def with_line(text: str, name: str, at: int, cells: Sequence[str] = (), stub: st
         raise Refused(Code.STUDIO, f"table `{name}` has no place {at} for a line")
     row = tuple(_checked(cell) for cell in cells) or ("",) * len(before.headings)
     stub = _checked(stub) or fresh(before, at)
-    splices, column, action = list[Splice](), 0, before.conditions
-    for part in table.parts:
-        heading = joined_cells(part.heading)
-        many, more = len(heading.conditions) - 1, len(heading.actions)
-        new = _row_text(
-            (name_of(stub) if splices else stub, *row[column : column + many]),
-            row[action : action + more],
-        )
-        column, action = column + many, action + more
-        splices.append(_inserted(text, table, part, at, new))
+    splices = new_line(text, table, at, stub, row)
     after = Sheet(
         before.headings,
         before.conditions,
@@ -329,28 +320,10 @@ def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
 
 def _cell_splices(text: str, table: WrittenTable, place: GridCell, new: str) -> Sequence[Splice]:
     """Return what writes a cell into the first of its rows, and takes it out of the others."""
-    rows, cell = _found(table, place)
-    whole = joined_cells(rows)
-    if cell not in whole.all:  # the row ends before it
+    found = written_cell(table, place.line, place.column)
+    if found is None:
         raise Refused(Code.STUDIO, "this line has other cells than the heading", "mend it in the text")
-    return over(text, cell, new, rows)
-
-
-def _found(table: WrittenTable, place: GridCell) -> tuple[tuple[RowText, ...], Cell]:
-    """The rows of a line, or of the heading, in the part that has a column; and the cell."""
-    column, every = place.column, [joined_cells(part.heading) for part in table.parts]
-    conditions = sum(len(heading.conditions) - 1 for heading in every)
-    for part, heading in zip(table.parts, every, strict=True):
-        many = len(heading.actions) if place.column >= conditions else len(heading.conditions) - 1
-        at = column - conditions if place.column >= conditions else column
-        if at < many:
-            if place.line >= len(part.lines):
-                break
-            rows = part.heading if place.line < 0 else part.lines[place.line]
-            cells = _fitted(joined_cells(rows), heading, rows[0].past)
-            return rows, cells.actions[at] if place.column >= conditions else cells.conditions[at + 1]
-        column -= many
-    raise Refused(Code.STUDIO, "this line is not in every part of the table", "mend it in the text")
+    return over(text, found[1], new, found[0])
 
 
 def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[Splice]:
@@ -416,30 +389,7 @@ def _reshaped(
             left, _, right = body.partition("||")
             cells = Cells((Cell("", "", 0),) * left.count("|"), (Cell("", "", 0),) * right.count("|"))
             conditions, actions = change(cells, top=False)
-            yield row.start, row.past, _row_text(["---"] * len(conditions), ["---"] * len(actions), "") + tail
+            yield row.start, row.past, row_text(["---"] * len(conditions), ["---"] * len(actions), "") + tail
         else:
             top = row.start == part.heading[0].start
-            yield row.start, row.past, _row_text(*change(cells_of(row), top=top)) + tail
-
-
-def _row_text(conditions: Sequence[str], actions: Sequence[str], blank: str = " ") -> str:
-    left = "|".join(f"{blank}{cell}{blank}" for cell in conditions)
-    right = "".join(f"{blank}{cell}{blank}|" for cell in actions)
-    return f"|{left}||{right}"
-
-
-def _inserted(text: str, table: WrittenTable, part: WrittenPart, at: int, row: str) -> Splice:
-    """Return the splice that writes a row before the line at a position of a part."""
-    if at < len(part.lines):
-        start, _ = whole_line(text, part.lines[at][0])
-        indent = text[start : part.lines[at][0].start]
-        return start, start, f"{indent}{row}\n"
-    last = table.rows_of(part)[-1]
-    start, _ = whole_line(text, last)
-    more = "" if part.lines or dashes(last) else f"\n{text[start : last.start]}{_dashes_of(part)}"
-    return last.past, last.past, f"{more}\n{text[start : last.start]}{row}"
-
-
-def _dashes_of(part: WrittenPart) -> str:
-    heading = joined_cells(part.heading)
-    return _row_text(["---"] * len(heading.conditions), ["---"] * len(heading.actions), "")
+            yield row.start, row.past, row_text(*change(cells_of(row), top=top)) + tail
