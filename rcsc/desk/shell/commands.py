@@ -15,10 +15,11 @@ from rcsc.desk.shell.queries import StateQuery, asked
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import MOST_CYCLES, Session
 from rcsc.desk.shell.typed_names import NamedLine
+from rcsc.lang.restart import COMMAND
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import NAME, known_name, normal
-from rcsc.run.orders.roles import COMMAND, served
+from rcsc.run.orders.roles import served
 
 Output = list[str]
 _SHOW = re.compile(rf"(?P<name>{NAME})\s*\?$")

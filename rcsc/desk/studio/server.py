@@ -51,8 +51,8 @@ class NoPort(CodedError):  # noqa: N818  # what happened, not an error of ours
 
 
 def page_files() -> dict[str, Traversable]:
-    """Return every file of the page by its path in the page's folder, `` for the first."""
-    found: dict[str, Traversable] = {}
+    """Return every file of the page by its path in the page's folder, `` for the first; with the colours that all pages have."""
+    found = {"palette.css": files("rcsc.views.pages").joinpath("palette.css")}
     waiting = [("", files("rcsc.desk.studio").joinpath("page"))]
     while waiting:
         prefix, folder = waiting.pop()

@@ -6,6 +6,7 @@ In: a package's folder of templates, which may extend `page.html.jinja`. Out: an
 import base64
 import hashlib
 import json
+from importlib.resources import files
 from typing import Any
 
 import jinja2
@@ -38,6 +39,11 @@ def quoted(text: str) -> Markup:
         Markup("<code>{}</code>").format(piece) if at % 2 else escape(piece)
         for at, piece in enumerate(pieces)
     )
+
+
+def palette() -> str:
+    """Return the style sheet of the colours that all pages have."""
+    return files("rcsc.views.pages").joinpath("palette.css").read_text(encoding="utf-8")
 
 
 def hashed(script: str) -> str:

@@ -9,16 +9,12 @@ from itertools import groupby
 
 from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
+from rcsc.views.pages.frame import palette
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
 from rcsc.views.trace.requirements import places
 from rcsc.views.trace.tables_of import spots
 
-_STYLE = """
-:root { --ink: #1d2329; --soft: #5b6670; --paper: #fff; --panel: #f4f6f8; --edge: #d5dbe0; --bad: #b3261e; --mark: #155fa8; }
-@media screen and (prefers-color-scheme: dark) {
-  :root { --ink: #e4e8eb; --soft: #9aa6b0; --paper: #14181c; --panel: #1c2228; --edge: #38424b; --bad: #ff8672; --mark: #7db8f0; }
-}
-* { box-sizing: border-box; }
+_STYLE = """* { box-sizing: border-box; }
 body { margin: 0 auto; padding: 1.2rem 1.5rem; max-width: 92rem; background: var(--paper); color: var(--ink);
   font: 14px/1.4 system-ui, sans-serif; }
 h1 { font-size: 1.5rem; margin: 0 0 .3rem; }
@@ -31,10 +27,10 @@ th { font-size: .8rem; color: var(--soft); background: var(--panel); }
 td { font-size: .82rem; }
 code { font: .95em ui-monospace, monospace; }
 .soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
-.for { color: var(--mark); font-weight: 600; } a { color: inherit; }
+.for { color: var(--accent); font-weight: 600; } a { color: inherit; }
 .at { white-space: nowrap; }
 nav a { margin-right: 1rem; }
-tr:target { outline: 2px solid var(--mark); }
+tr:target { outline: 2px solid var(--accent); }
 @media print {
   body { padding: 0; max-width: none; font-size: 9pt; } h2 { break-before: page; }
   tr { break-inside: avoid; } thead { display: table-header-group; }
@@ -63,7 +59,7 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<meta name="color-scheme" content="light dark">\n'
-        f'<link rel="icon" href="data:,">\n<title>Traceability</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n'
+        f'<link rel="icon" href="data:,">\n<title>Traceability</title>\n<style>\n{palette()}{_STYLE}</style>\n</head>\n<body>\n'
         + "\n".join(body)
         + "\n</body>\n</html>\n"
     )

@@ -1,7 +1,7 @@
 // The cell: what stands outside the levels, in space and as a drawing, at the tick that everybody looks at.
 
 import { Refusal } from "./bus.js";
-import { make, spoken } from "./make.js";
+import { colour, make, spoken } from "./make.js";
 import { OrbitControls } from "./vendor/three/OrbitControls.js";
 import * as THREE from "./vendor/three/three.module.js";
 
@@ -212,9 +212,8 @@ export function mount(root, bus) {
   }
 
   function theme() {
-    const style = getComputedStyle(document.documentElement);
-    scene.background = new THREE.Color(style.getPropertyValue("--paper").trim());
-    grid.material.color?.set(style.getPropertyValue("--strong-edge").trim());
+    scene.background = new THREE.Color(colour("paper"));
+    grid.material.color?.set(colour("strong-edge"));
     grid.material.vertexColors = false;
     grid.material.transparent = true;
     grid.material.needsUpdate = true;

@@ -16,3 +16,12 @@ export function make(kind, attributes = {}, ...inside) {
 export function spoken(text) {
   return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
 }
+
+const probe = make("i", { hidden: true });
+
+/** A colour of the palette as canvases take it: what it is in the theme of now. */
+export function colour(name) {
+  if (!probe.isConnected) document.body.append(probe);
+  probe.style.color = `var(--${name})`;
+  return getComputedStyle(probe).color;
+}

@@ -1,11 +1,12 @@
 // Graphs of any variables: several curves each, against time or against another variable; a value that nobody has set is a gap.
 
-import { make, Refusal } from "./bus.js";
+import { Refusal } from "./bus.js";
+import { colour, make } from "./make.js";
 import { lookAt } from "./moments.js";
 import uPlot from "./vendor/uplot/uPlot.js";
 
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3], [4, 2], [1, 4]];
-const COLOURS = ["--accent", "--bad", "--good", "--plum", "--warn", "--steel"];
+const COLOURS = ["accent", "bad", "good", "plum", "warn", "steel"];
 const EVERY_MS = 250;
 
 export function mount(root, bus) {
@@ -211,8 +212,7 @@ export function mount(root, bus) {
   }
 
   function options(graph) {
-    const style = getComputedStyle(document.documentElement);
-    const [ink, edge] = [style.getPropertyValue("--soft").trim(), style.getPropertyValue("--edge").trim()];
+    const [ink, edge] = [colour("soft"), colour("edge")];
     const drawn = graph.curves.filter(({ name }) => name !== graph.over);
     const x = graph.curves.find(({ name }) => name === graph.over);
     const axis = (curves, label) => {
@@ -225,13 +225,13 @@ export function mount(root, bus) {
       width: Math.max(240, graph.place.clientWidth), height: 190, legend: { show: false }, cursor: { drag: { x: !graph.over, y: false } },
       scales: { x: { time: false } },
       axes: [{ ...axis(x ? [x] : [], x ? `${x.name}${x.unit ? ` (${x.unit})` : ""}` : "time (s)"), size: 34 }, axis(drawn, units)],
-      series: [{}, ...drawn.map((one, at) => ({ label: one.name, scale: "y", stroke: colour(at), dash: DASHES[at % DASHES.length], width: 1.6, spanGaps: false,
+      series: [{}, ...drawn.map((one, at) => ({ label: one.name, scale: "y", stroke: stroke(at), dash: DASHES[at % DASHES.length], width: 1.6, spanGaps: false,
         points: { show: false }, paths: graph.over ? () => null : uPlot.paths.stepped({ align: 1 }) }))],
       hooks: { draw: [(plot) => { if (graph.over) path(plot, graph); now(plot, graph); }] },
     };
   }
 
-  const colour = (at) => getComputedStyle(document.documentElement).getPropertyValue(COLOURS[at % 6]);
+  const stroke = (at) => colour(COLOURS[at % 6]);
 
   /** A curve over another variable: from each tick to the next, with nothing where either was not set. */
   function path(plot, graph) {
@@ -243,7 +243,7 @@ export function mount(root, bus) {
     ctx.clip();
     graph.curves.filter((_, at) => at !== across).forEach((curve, at) => {
       const ys = graph.values[graph.curves.indexOf(curve)];
-      ctx.strokeStyle = colour(at);
+      ctx.strokeStyle = stroke(at);
       ctx.lineWidth = 1.6 * devicePixelRatio;
       ctx.setLineDash(DASHES[at % DASHES.length].map((one) => one * devicePixelRatio));
       ctx.beginPath();
@@ -268,7 +268,7 @@ export function mount(root, bus) {
     const { ctx } = plot;
     ctx.save();
     ctx.setLineDash([]); // the last curve's is still set
-    ctx.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--ink").trim();
+    ctx.strokeStyle = colour("ink");
     ctx.lineWidth = devicePixelRatio;
     ctx.beginPath();
     if (!graph.over) {

@@ -1,6 +1,6 @@
 // The time line: which line each level ran, at every tick. Everybody looks at the tick that is chosen here.
 
-import { make } from "./bus.js";
+import { colour, make } from "./make.js";
 import { followMoments, lookAt } from "./moments.js";
 
 const [AXIS, ROW, LEAST] = [18, 20, 8]; // pixels, pixels, ticks
@@ -61,10 +61,7 @@ export function mount(root, bus) {
   // --- drawing ---
 
   function soon() { if (!due) { due = true; requestAnimationFrame(() => { due = false; draw(); }); } }
-  const colours = () => {
-    const style = getComputedStyle(document.documentElement);
-    return Object.fromEntries(["ink", "soft", "paper", "panel", "edge", "strong-edge", "accent", "bad", "lit", "lit-ink", "warn"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
-  };
+  const colours = () => Object.fromEntries(["ink", "soft", "paper", "panel", "edge", "strong-edge", "accent", "bad", "lit", "lit-ink", "warn"].map((name) => [name, colour(name)]));
   const dark = () => bus.latest("theme") === "dark";
   const tint = (text, at) => {
     let hash = 0;
