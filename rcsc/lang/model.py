@@ -21,7 +21,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator, single, spell_single
-from rcsc.lang.restart import Adopted, Part, by_names
+from rcsc.lang.restart import SEEN, Adopted, Part, by_names
 
 VariableName = NewType("VariableName", str)
 ProcedureName = NewType("ProcedureName", str)
@@ -935,7 +935,7 @@ class Roles:
             "new_command",
             "answered",
             "settling",
-            "inc_command_seen",
+            SEEN,
             "echoed",
             *(f"{peer}_{word}" for peer in peers for word in ("waited", "again")),
         }

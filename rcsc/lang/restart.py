@@ -62,19 +62,27 @@ class Part:
     whole: tuple[int, int] | None
 
 
+NUMBER, COMMAND = "inc_command", "input_command"
+"""The fields of an order that the protocol makes (Haynes et al. 1984, section 9)."""
+ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
+"""Those of a report: the number and the command that it answers, and what has become of them."""
+PROTOCOL = (NUMBER, COMMAND, ECHO, ECHOED, STATUS)
+"""Fields that the protocol fills; all others of an order and a report are the user's."""
+SEEN = "inc_command_seen"
+"""State of a level: the number of the order that it took last."""
 _ORDER = "to_"
-_ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
+_NUMBERS = {NUMBER: ECHO, "number": "number"}
 """How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too."""
-ECHOED = ("inc_command_echo", "ref_command_echo")
+ECHOES = (ECHO, ECHOED)
 """Fields of a report with the order that it answers: they never go back, not even if the first cycle takes nothing."""
 _FAILED = {
-    "status_report": "failed",
+    STATUS: "failed",
     "failure": "restart",
     "cur_state": "f_state",
     "cur_state.next": "f_state",
 }
 """A member, by its name, for a state; the failure stands until the next command."""
-_REPORTED = ("status_report", "failure")
+_REPORTED = (STATUS, "failure")
 """Likewise of a report, which is published even if the first cycle takes nothing."""
 
 
@@ -90,21 +98,21 @@ def _failed(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
 
 
 def _seen(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
-    seen, taken = parts.get("inc_command_seen"), parts.get("command.inc_command")
+    seen, taken = parts.get(SEEN), parts.get(f"command.{NUMBER}")
     if seen is not None and taken is not None and seen.whole == taken.whole == NUMBERED:
         # no other number stands there, not even a refused one
-        yield "inc_command_seen", SameAs("command.inc_command")
+        yield SEEN, SameAs(f"command.{NUMBER}")
 
 
 def _reports(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
     for name, part in parts.items():
         record, _, field = name.rpartition(".")
-        if part.output and field in ECHOED:
+        if part.output and field in ECHOES:
             yield name, Stands()
         elif (
             part.output
             and field in _REPORTED
-            and f"{record}.{ECHOED[0]}" in parts
+            and f"{record}.{ECHO}" in parts
             and _FAILED[field] in part.members
         ):
             yield name, Fixed(part.members.index(_FAILED[field]))
@@ -115,10 +123,10 @@ def _orders(parts: Mapping[str, Part]) -> Iterator[tuple[str, Adopted]]:
         if not (part.output and name.startswith(_ORDER)):
             continue
         record, _, field = name.partition(".")
-        if field == "input_command":
+        if field == COMMAND:
             if part.members:
                 yield name, Fixed(0)
             continue
-        echo = f"{record.removeprefix(_ORDER)}.{_ECHOES.get(field, '')}"
+        echo = f"{record.removeprefix(_ORDER)}.{_NUMBERS.get(field, '')}"
         if part.whole == NUMBERED and echo in parts and parts[echo].whole == NUMBERED:
             yield name, After(echo)

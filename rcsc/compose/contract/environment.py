@@ -22,8 +22,9 @@ from rcsc.lang.model import (
     Scalar,
     Variable,
 )
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.description import BadDescription, Description
-from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Neighbour
+from rcsc.run.orders.roles import Neighbour
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,9 +33,9 @@ from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_ta
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.execution import Run
-from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER
 
 
 def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:

@@ -40,12 +40,13 @@ from rcsc.compose.proof.context import gives_an_order, of_lines, orders_to
 from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
 from rcsc.compose.proof.staying import in_a_row, while_it_stays
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending, spell
+from rcsc.lang.restart import ECHO, ECHOED, NUMBER, STATUS
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.keyed import sort
 from rcsc.proof.symbolic.values import Node
-from rcsc.run.orders.roles import ECHO, ECHOED, NUMBER, STATUS, Neighbour
+from rcsc.run.orders.roles import Neighbour
 
 MOST_STEPS = 400
 

@@ -14,11 +14,12 @@ from typing import Any, Literal, TypeAlias
 from rcsc.base.diagnostics.coded import CodedError
 from rcsc.driver.compile import compile_system
 from rcsc.front.api.proofs import PathLike
+from rcsc.lang.restart import COMMAND
 from rcsc.run.description import Description, description
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.numbered import Orders
 from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun, line_to
-from rcsc.run.orders.roles import COMMAND, Served, field_of, served
+from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.signature import Leaf, Signature, Value, Values

@@ -25,6 +25,7 @@ from rcsc.lang.model import (
     VariableName,
     unit_text,
 )
+from rcsc.lang.restart import COMMAND, ECHO, NUMBER, SEEN, STATUS
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
 
@@ -219,15 +220,15 @@ class Scope:
 
 
 _FIELDS = {
-    "command": "input_command",
-    "number": "inc_command",
-    "status": "status_report",
-    "echo": "inc_command_echo",
+    "command": COMMAND,
+    "number": NUMBER,
+    "status": STATUS,
+    "echo": ECHO,
 }
 """Fields that the protocol makes, by what one would call them."""
 _HELD = frozenset({"resting", "late", "status"})
 """Fields of a subordinate's state besides its report's fields."""
-_SERVING = frozenset({"new_command", "answered", "inc_command_seen"})
+_SERVING = frozenset({"new_command", "answered", SEEN})
 """State that a level keeps about its superior's order."""
 
 

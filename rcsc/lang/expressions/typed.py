@@ -58,6 +58,7 @@ from rcsc.lang.operator_table import (
     is_conversion,
     is_logic,
 )
+from rcsc.lang.restart import COMMAND
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
@@ -313,7 +314,7 @@ def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
         return None
     if not isinstance(path.type, Bool | Enum | Int | Real):
         own = [part.name for part in path.type.fields] if isinstance(path.type, Record) else []
-        helps = [f"write `{path.names[0]}.input_command`"] if "input_command" in own else []
+        helps = [f"write `{path.names[0]}.{COMMAND}`"] if COMMAND in own else []
         scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span, *helps)
         return None
     return _read(path, written.span)

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.protocol import written
 from rcsc.lang.protocol.roles import Parties
+from rcsc.lang.restart import COMMAND
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 
@@ -94,7 +95,7 @@ def _heading(parties: Parties, heading: tree.Heading) -> tree.Heading:
         case tree.Reference(name) if (party := parties.named(name.text)) is not None:
             place = tree.FieldOf(
                 tree.Reference(replace(name, text=party.told), heading.subject.span),
-                replace(name, text="input_command"),
+                replace(name, text=COMMAND),
                 heading.subject.span,
             )
             return replace(heading, subject=place)

@@ -8,6 +8,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.literals import number_of
 from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.lang.syntax import tree
 
 MOST_DEPTH, MOST_LENGTH = 16, 1024
@@ -102,9 +103,9 @@ class Parties:
     def numbers(self) -> frozenset[str]:
         """The leaves that only the protocol writes: numbers of orders, echoes, and the held reports of subordinates."""
         held = (f"{party.name}.{part}" for party in self.subordinates for part in _HELD)
-        above = () if self.superior is None else ("inc_command_echo", "ref_command_echo")
+        above = () if self.superior is None else (ECHO, ECHOED)
         own = (f"{self.superior.told}.{part}" for part in above if self.superior is not None)
-        return frozenset((*own, *held, *(f"{party.told}.inc_command" for party in self.subordinates)))
+        return frozenset((*own, *held, *(f"{party.told}.{NUMBER}" for party in self.subordinates)))
 
     def named(self, name: str) -> Party | None:
         """Return the subordinate of that name; None if there is none."""
@@ -283,7 +284,7 @@ def _party(peer: tree.Name, link: tree.LinkDecl, types: "_Types", **more: Any) -
     failed = types.members[link.status.text].index(link.failed.text)
     parts = (part for part in link.order if part.word != "stream")
     scalars = (scalar for part in parts for scalar in types.scalars(part.name.text, part.type))
-    return Party(peer, link, failed, ("input_command", *scalars), types.none(link), **more)
+    return Party(peer, link, failed, (COMMAND, *scalars), types.none(link), **more)
 
 
 def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
@@ -320,7 +321,7 @@ def _sound(scope: Scope, link: tree.LinkDecl, types: "_Types") -> bool:
 
 def _misplaced(link: tree.LinkDecl, enums: Mapping[str, tuple[str, ...]]) -> Iterator[tuple[str, Span]]:
     """Yield a message for each field that the protocol makes itself, and for each invalid reason."""
-    own = {"inc_command", "input_command"}, {"inc_command_echo", "ref_command_echo", "status_report", *_HELD}
+    own = {NUMBER, COMMAND}, {ECHO, ECHOED, STATUS, *_HELD}
     for parts, made in zip((link.order, link.report), own, strict=True):
         for part in parts:
             if part.name.text in made:

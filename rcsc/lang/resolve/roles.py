@@ -32,7 +32,20 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
 from rcsc.lang.resolve.variables import value_given
-from rcsc.lang.restart import ECHOED, NUMBERED, Adopted, After, Fixed, SameAs, Stands, by_names
+from rcsc.lang.restart import (
+    COMMAND,
+    ECHOES,
+    NUMBER,
+    NUMBERED,
+    SEEN,
+    STATUS,
+    Adopted,
+    After,
+    Fixed,
+    SameAs,
+    Stands,
+    by_names,
+)
 from rcsc.lang.syntax import tree
 
 
@@ -49,9 +62,7 @@ def roles_of(scope: Scope, parties: Parties) -> Roles | None:
 
 def _link(link: tree.LinkDecl, order: str, report: str, scope: Scope) -> Link:
     """Return the link field by field, in words that two files have in common: types by their values, not their names."""
-    command, status = (
-        scope.leaves[leaf].type for leaf in (f"{order}.input_command", f"{report}.status_report")
-    )
+    command, status = (scope.leaves[leaf].type for leaf in (f"{order}.{COMMAND}", f"{report}.{STATUS}"))
     parts = [
         LinkPart("the commands", _kind(command), link.command.span),
         LinkPart("the command that rests", link.rest.text, link.rest.span),
@@ -178,9 +189,9 @@ def _protocol(scope: Scope, parties: Parties) -> Iterator[tuple[str, Adopted]]:
     """Yield what a level adopts by protocol: the order in its buffer counts as seen, and has failed; each level below is to rest."""
     above = parties.superior
     if above is not None:
-        yield "inc_command_seen", SameAs(f"{above.name}.inc_command")
-        yield f"{above.told}.status_report", Fixed(above.failed)
-        yield from ((f"{above.told}.{echo}", Stands()) for echo in ECHOED)
+        yield SEEN, SameAs(f"{above.name}.{NUMBER}")
+        yield f"{above.told}.{STATUS}", Fixed(above.failed)
+        yield from ((f"{above.told}.{echo}", Stands()) for echo in ECHOES)
         for part in above.link.report:
             leaf = scope.leaves.get(f"{above.told}.{part.name.text}")
             value = None if leaf is None else value_given(scope, part.restart, leaf.type, "restart")

@@ -41,6 +41,7 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.lang.resolve.variables import fits
+from rcsc.lang.restart import COMMAND, NUMBER
 from rcsc.lang.syntax import tree
 
 MOST_ROUNDS = 4096
@@ -99,12 +100,12 @@ class Statements:
         """Resolve an order to a subordinate: the command, then each field that is named; the others are kept."""
         told, once_more = self.scope.orders[subordinate]
         if not isinstance(value, tree.Order):
-            return self.assign(_part(told, tree.Name("input_command", value.span)), value, False, span)
-        command = _part(told, tree.Name("input_command", value.command.span))
+            return self.assign(_part(told, tree.Name(COMMAND, value.span)), value, False, span)
+        command = _part(told, tree.Name(COMMAND, value.command.span))
         statements = [*self.assign(command, tree.Reference(value.command, value.command.span), False, span)]
         named: set[str] = set()
         for part in value.fields:
-            if part.name.text in {"inc_command", "input_command"}:
+            if part.name.text in {NUMBER, COMMAND}:
                 helps = "the command stands before the parentheses; `again` gives the same order a new number"
                 self.scope.report(
                     Code.NOT_WRITABLE, f"the protocol writes `{part.name.text}`", part.name.span, helps

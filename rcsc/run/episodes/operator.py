@@ -8,11 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
+from rcsc.lang.restart import COMMAND
 from rcsc.run.episodes.episode import OrderSpec, Setting
 from rcsc.run.episodes.outcome import RowEnd
 from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.operator import answer_reason, line_to
-from rcsc.run.orders.roles import COMMAND, DONE, FAILED, Served
+from rcsc.run.orders.roles import DONE, FAILED, Served
 from rcsc.run.signature import REALS, Leaf, Value, Values
 
 NO_NUMBER = "nan"

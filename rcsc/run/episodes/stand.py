@@ -15,10 +15,10 @@ from rcsc.code.testing.executors.edges import leaf_edges, outside
 from rcsc.lang.model import Admit, Program, Scalar, Value, Variable, VariableName, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.lang.restart import After
+from rcsc.lang.restart import NUMBER, PROTOCOL, After
 from rcsc.run.description import BadDescription, Description, description, places
 from rcsc.run.faults import faults_of
-from rcsc.run.orders.roles import PROTOCOL, Served, field_of, ordered
+from rcsc.run.orders.roles import Served, field_of, ordered
 from rcsc.run.orders.script import OutsideBuffer, outside_buffers
 from rcsc.run.plant.load import chosen
 from rcsc.run.plant.staging import StageOrder, staged
@@ -195,7 +195,7 @@ def _fields(
             adopted.leaf for adopted in programs[level].adopted.values() if isinstance(adopted, After)
         }
         numbered = {field_of(leaf) for leaf in buffer.leaves} & set(PROTOCOL)
-        if "inc_command" in numbered:
+        if NUMBER in numbered:
             continue
         for place, (column, leaf) in enumerate(zip(buffer.columns, buffer.leaves, strict=True)):
             if (numbered and field_of(leaf) in PROTOCOL) or leaf.name in repeated:

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.episodes.operator import between
 from rcsc.run.episodes.stand import Stand
 from rcsc.run.orders.numbered import Latest
-from rcsc.run.orders.roles import COMMAND, DONE, ECHO, ECHOED, FAILED, NUMBER, STATUS, field_of
+from rcsc.run.orders.roles import DONE, FAILED, field_of
 from rcsc.run.signature import Leaf, Value, Values
 
 DELAYS = (0, 0, 1, 2, 8)

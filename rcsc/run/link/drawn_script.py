@@ -10,6 +10,7 @@ from random import Random
 from typing import TypeAlias
 
 from rcsc.code.emit.code_tree import type_bounds
+from rcsc.lang.restart import ECHO, NUMBER
 from rcsc.run.description import Description
 from rcsc.run.signature import REALS, Leaf, Signature, Value, Values
 
@@ -53,7 +54,7 @@ def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
     inside = [value for value in edges(leaf) if leaf.c_type == "bool" or low <= value <= high]
     way = random.random()
-    if leaf.name.endswith(("inc_command", "inc_command_echo")) and way < 0.8:
+    if leaf.name.endswith((NUMBER, ECHO)) and way < 0.8:
         return before if way < 0.3 or before >= high else int(before) + 1
     if way < wild:
         return random.choice(edges(leaf))

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rcsc.lang.model import pending
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import fault_of
-from rcsc.run.orders.roles import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.signature import Leaf, Signature, Values
 
 MOST_KNOWN = 64

@@ -4,7 +4,8 @@ In: a description, signatures, a script. Out: an operator that stands outside th
 number and waits until the report that repeats the number says done or failed. Any level can be ordered whose superior
 stands outside.
 
->>> from rcsc.run.orders.roles import DONE, NUMBER
+>>> from rcsc.lang.restart import NUMBER
+from rcsc.run.orders.roles import DONE
 >>> NUMBER, DONE
 ('inc_command', 'done')
 

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from rcsc.lang.restart import COMMAND, PROTOCOL
 from rcsc.run.orders.numbered import Latest, Orders
-from rcsc.run.orders.roles import COMMAND, DONE, FAILED, PROTOCOL, Served, field_of
+from rcsc.run.orders.roles import DONE, FAILED, Served, field_of
 from rcsc.run.orders.script import OrderRow
 from rcsc.run.signature import Value, Values
 from rcsc.run.system import System

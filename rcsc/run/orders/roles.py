@@ -9,13 +9,10 @@ names say it (Haynes et al. 1984, section 9): an order has `inc_command` and `in
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.description import Description
 from rcsc.run.signature import Leaf, Serves, Signature, Value
 
-NUMBER, COMMAND = "inc_command", "input_command"
-ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
-PROTOCOL = (NUMBER, COMMAND, ECHO, ECHOED, STATUS)
-"""Fields that the protocol fills; all others of an order and a report are the user's."""
 DONE, FAILED = "done", "failed"
 """What members of the status mean, by name."""
 

@@ -23,9 +23,10 @@ from rcsc.base.diagnostics.coded import CodedError
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.described import nearest
 from rcsc.base.host.files.read import MIB, Malformed, table_of, text, toml_of
+from rcsc.lang.restart import PROTOCOL
 from rcsc.run.description import Description
 from rcsc.run.faults import UnknownFault
-from rcsc.run.orders.roles import DONE, PROTOCOL, Served, field_of, served
+from rcsc.run.orders.roles import DONE, Served, field_of, served
 from rcsc.run.signature import Leaf, Signature, Value
 
 COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT = "command", "level", "cycles", "within", "expect", "fault"

@@ -7,9 +7,9 @@ is told by the description: it is what the database is asked for. A log holds nu
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from rcsc.lang.restart import STATUS
 from rcsc.run.description import Description
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.orders.roles import STATUS
 from rcsc.run.signature import Values
 from rcsc_cell.cell.arm import Joints, solve
 from rcsc_cell.cell.mujoco_model import OPEN_MM

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 from rcsc.lang.interpret import UNDEFINED, Fault, cycle
 from rcsc.lang.model import Value
+from rcsc.lang.restart import ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import Now, Reader
-from rcsc.run.orders.roles import ECHO, NUMBER, STATUS
 from rcsc.run.signature import Leaf, Values
 
 NUMBERS = 65536
@@ -21,7 +21,7 @@ MOST_CYCLES = 400
 """Of one command that are remembered."""
 MOST_ROUNDS = 4
 """Earlier cycles from which a round may come that are looked at, the latest first."""
-_SPEAKS = (NUMBER, ECHO, "ref_command_echo", STATUS)
+_SPEAKS = (NUMBER, ECHO, ECHOED, STATUS)
 
 
 @dataclass(frozen=True, slots=True)
