@@ -5,7 +5,7 @@ number and waits until the report that repeats the number says done or failed. A
 stands outside.
 
 >>> from rcsc.lang.restart import NUMBER
-from rcsc.run.orders.roles import DONE
+>>> from rcsc.run.orders.roles import DONE
 >>> NUMBER, DONE
 ('inc_command', 'done')
 

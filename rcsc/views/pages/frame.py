@@ -6,7 +6,6 @@ In: a package's folder of templates, which may extend `page.html.jinja`. Out: an
 import base64
 import hashlib
 import json
-from importlib.resources import files
 from typing import Any
 
 import jinja2
@@ -43,7 +42,7 @@ def quoted(text: str) -> Markup:
 
 def palette() -> str:
     """Return the style sheet of the colours that all pages have."""
-    return files("rcsc.views.pages").joinpath("palette.css").read_text(encoding="utf-8")
+    return PAGES.get_template("palette.css").render()
 
 
 def hashed(script: str) -> str:
