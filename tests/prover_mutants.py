@@ -9,7 +9,7 @@ mutmut makes the mutants. A test runs once by itself, in a fork, to learn which 
 takes the place of its function in a fork of its own, in which everything is imported and collected, and its tests run until the first
 that fails: first those that caught most of their like for their cost. A test that takes ten times as long has noticed, too. `--seconds`
 is what a mutant may cost before it counts as a survivor. `--only PATTERN` draws by name (`rcsc.proof.table.boxes.*`), `--tests PATTERN`
-takes some of the test files, `--covering FILE` keeps what is learnt of the tests from run to run.
+takes some of the test files, `--ordinary` leaves out what is thorough, `--covering FILE` keeps what is learnt of the tests from run to run.
 """
 
 import argparse
@@ -440,6 +440,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--only", default="*", metavar="PATTERN")
     parser.add_argument("--tests", default="*", metavar="PATTERN")
+    parser.add_argument("--ordinary", action="store_true")
     parser.add_argument("--covering", type=Path, default=None, metavar="FILE")
     return parser.parse_args()
 
@@ -452,6 +453,8 @@ def main() -> int:
         lambda: _drawn(asked.count, asked.seed, asked.only), asked.jobs, asked.seconds, asked.covering
     )
     options = ["-q", "--no-header", "--no-summary", "-p", "no:cacheprovider", "-p", "no:unraisableexception"]
+    if asked.ordinary:
+        options += ["-m", "not thorough"]
     status = pytest.main([*options, f"--rootdir={REPO}", *tests], plugins=[campaign])
     if not campaign.told:
         print(f"nothing was run: no mutant is like {asked.only}, or no test (pytest ends with {status})")
