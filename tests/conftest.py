@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from rcsc.front.commands import run
-from tests.sets import THOROUGH, chosen, quick
+from tests.sets import THOROUGH, chosen, quick, whole
 
 # A shell's `&` begins a command with SIGINT ignored, which all its children inherit; tests send it to them.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -100,14 +100,6 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return True if file not in {name.partition("::")[0] for name in chosen()} else None
 
 
-def _alone(config: pytest.Config) -> bool:
-    """Whether nothing is asked for by its folder, name, mark or a word of it: then what is thorough is not meant."""
-    whole = [Path(__file__).parent] == [
-        Path(config.invocation_params.dir, one).resolve() for one in config.args
-    ]
-    return whole and not config.getoption("markexpr") and not config.getoption("keyword")
-
-
 @pytest.hookimpl(tryfirst=True)  # before `-m` is asked
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Marks what is quick or thorough (`tests.sets`) and puts what is quick first; leaves out what is thorough where nothing is asked for.
@@ -124,11 +116,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker("thorough")
     # What most changes break shows in the first minute.
     items.sort(key=lambda item: "quick" not in item.keywords)
-    alone = _alone(config)
+    of_all = whole(config)
     left_out = {
         item
         for item in items
-        if (alone and "thorough" in item.keywords)
+        if (of_all and "thorough" in item.keywords)
         or any(_missing(tool) for mark in item.iter_markers("needs") for tool in mark.args)
     }
     if left_out:
@@ -138,7 +130,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Says what was left out: what is thorough, and what needs tools that are not here."""
-    if _alone(config):
+    if whole(config):
         terminalreporter.write_line("left out: what takes long; `pytest -m thorough` runs it")
     missing = sorted(tool for tool in TOOLS if _missing(tool))
     if missing:

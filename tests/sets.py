@@ -16,6 +16,8 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import pytest
+
 QUICK, THOROUGH = (Path(__file__).with_name(f"{name}.txt") for name in ("quick", "thorough"))
 MOST_S = 16.0
 """Processor time that all may take, but for what it takes to find them."""
@@ -43,6 +45,12 @@ def quick(name: str, chosen: Iterable[str]) -> bool:
 def chosen(of: Path = QUICK) -> frozenset[str]:
     """Return a list; read once, as every test is held against it."""
     return frozenset(of.read_text(encoding="utf-8").splitlines())
+
+
+def whole(config: pytest.Config) -> bool:
+    """Whether nothing is asked for by its folder, name, mark or a word of it: then what is thorough is not meant."""
+    asked = [Path(config.invocation_params.dir, one).resolve() for one in config.args]
+    return asked == [QUICK.parent] and not config.getoption("markexpr") and not config.getoption("keyword")
 
 
 def choose_thorough(took_s: Mapping[str, float]) -> list[str]:

@@ -16,6 +16,7 @@ from tests.sets import (
     chosen,
     measured,
     quick,
+    whole,
 )
 
 HERE = Path(__file__).parent
@@ -73,9 +74,4 @@ def test_what_is_thorough_is_there_and_is_left_out_only_where_nothing_is_asked_f
         assert f"def {function.rpartition('::')[2]}(" in (HERE / file).read_text(encoding="utf-8"), name
     assert not chosen(THOROUGH) & KEPT
     found = {item.nodeid.removeprefix("tests/") for item in request.session.items}
-    asked = (
-        pytestconfig.args != ["tests"]
-        or pytestconfig.getoption("markexpr")
-        or pytestconfig.getoption("keyword")
-    )
-    assert asked or not found & chosen(THOROUGH)
+    assert not whole(pytestconfig) or not found & chosen(THOROUGH)
