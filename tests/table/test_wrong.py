@@ -3,10 +3,13 @@
 import random
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
+import z3
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.lang.model import Int
 from rcsc.proof.relation.alike import meeting
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.smt import Answer
@@ -274,3 +277,34 @@ def test_every_command_ends_on_a_wrong_table(number: int, tmp_path: Path) -> Non
                 does()
         else:
             does()
+
+
+def test_a_question_that_ran_out_leaves_nothing_to_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Z3 may end the process where it goes on after one: a new solver of Z3 has what was asserted, in its scopes."""
+    made = Mock(side_effect=z3.Solver)
+    monkeypatch.setattr(z3, "Solver", made)
+    number, kind = smt.variable("x", Int(0, 9)), Int(0, 9)
+    limit = [smt.literal(kind, value) for value in range(10)]
+    solver = smt.Solver()
+    solver.add(smt.below(limit[1], number, kind))
+    doubled = solver.named(smt.integer_operation("+", number, number))
+    for _ in range(2):
+        solver.push()
+        solver.add(smt.below(number, limit[4], kind))
+        with smt.together(1):
+            assert solver.check(smt.equal(doubled, limit[6], kind)) is Answer.UNKNOWN
+        solver.push()
+        solver.add(smt.below(limit[3], number, kind))
+        assert solver.check() is Answer.UNSATISFIABLE
+        solver.pop()
+        assert solver.check(smt.equal(doubled, limit[2], kind)) is Answer.UNSATISFIABLE
+        assert solver.check() is Answer.SATISFIABLE
+        assert solver.value(number, kind) in (2, 3)
+        with smt.together(1):
+            assert solver.check(smt.equal(doubled, limit[6], kind)) is Answer.UNKNOWN
+        solver.pop()
+        solver.add(smt.below(number, limit[7], kind))
+        assert solver.check(smt.below(number, limit[6], kind)) is Answer.SATISFIABLE
+        assert solver.check(smt.below(limit[6], number, kind)) is Answer.UNSATISFIABLE
+    assert made.call_count == 5
+    assert "7" in solver.script()

@@ -453,6 +453,10 @@ def to_integer(term: Term) -> Term:
 class Solver:
     """One incremental solver.
 
+    What Z3 has of a question that was broken off, by its steps, the clock or a user, is not fit for the next: a process that went on
+    with it has ended by a null pointer in Z3 (5.4), and to drop assertions from it can take Z3 for ever. So it is dropped, and what
+    was asserted is stated to a new one.
+
     Attributes:
         queries: How often it was asked.
         refuted: If it remembers: for each unsatisfiable answer, the assertions that are not permanent.
@@ -460,24 +464,39 @@ class Solver:
     """
 
     def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
-        z3 = _z3()
-        z3.set_param("memory_max_size", limits.memory_mb)
-        self._solver: Any = z3.Solver()
+        _z3().set_param("memory_max_size", limits.memory_mb)
         self._steps = self._given = limits.steps
-        self._solver.set("rlimit", limits.steps)
         self._cpu_s = self._patience_s = limits.cpu_s
-        self._wait()
-        self._solver.set("random_seed", 0)
+        self._seed = 0
+        self._asserted: list[list[Term]] = [[]]
+        self._begin()
         self.queries = 0
         self.refuted: list[Term] = []
         self._remembers = remembers
-        self._added: list[list[Term]] = []
         self._model: Any = None
         self.names = 0
 
+    def _begin(self) -> None:
+        """Make a solver of Z3, and state to it all that is asserted."""
+        self._solver: Any = _z3().Solver()
+        self._broken = False
+        self._solver.set("rlimit", self._given)
+        self._wait()
+        self._solver.set("random_seed", self._seed)
+        permanent, *pushed = self._asserted
+        self._solver.add(*permanent)
+        for terms in pushed:
+            self._solver.push()
+            self._solver.add(*terms)
+
+    def _mend(self) -> None:
+        """Begin anew after a question that was broken off."""
+        if self._broken:
+            self._begin()
+
     def begins_anew(self, steps: int, seed: int) -> None:
         """Bound each later question to so many steps, and seed the search anew."""
-        self._steps = steps
+        self._steps, self._seed = steps, seed
         self._solver.set("random_seed", seed)
 
     def named(self, term: Term) -> Term:
@@ -485,7 +504,7 @@ class Solver:
         defined: Any = term
         self.names += 1
         constant: Any = _z3().Const(f"named!{self.names}", defined.sort())
-        self._solver.add(constant == term)
+        self.add(Term(constant == term))
         return Term(constant)
 
     def switch(self, term: Term) -> Term:
@@ -500,19 +519,21 @@ class Solver:
 
     def add(self, *terms: Term) -> None:
         """Assert the terms."""
-        self._solver.add(*terms)
-        if self._added:
-            self._added[-1] += terms
+        self._asserted[-1] += terms
+        if not self._broken:
+            self._solver.add(*terms)
 
     def push(self) -> None:
         """Remember what is asserted now, for `pop`."""
-        self._solver.push()
-        self._added.append([])
+        self._asserted.append([])
+        if not self._broken:
+            self._solver.push()
 
     def pop(self) -> None:
         """Drop what was asserted since the last `push`."""
-        self._solver.pop()
-        self._added.pop()
+        self._asserted.pop()
+        if not self._broken:
+            self._solver.pop()
 
     def check(self, *assuming: Term) -> Answer:
         """Ask whether all that is asserted can hold together with these terms."""
@@ -522,6 +543,7 @@ class Solver:
             return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
+        self._mend()
         self._give(min([self._steps, *(budget.left for budget in _own.budgets)]))
         try:
             answer, why = self._answer(assuming)
@@ -530,7 +552,8 @@ class Solver:
         if "interrupted" in why and not spent():  # Z3 takes Ctrl-C for itself
             raise KeyboardInterrupt
         if answer == z3.unsat and self._remembers:
-            self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
+            pushed = [term for terms in self._asserted[1:] for term in terms]
+            self.refuted.append(all_of([*pushed, *assuming]))
         if answer == z3.sat:
             return Answer.SATISFIABLE
         if answer != z3.unsat:
@@ -570,11 +593,12 @@ class Solver:
                 _cut.append(round(used_s))
                 return answer, why
             self._patience_s *= 4
+            self._mend()
             self._wait()
 
     def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
         """Return Z3's answer, and whether it was broken off."""
-        asker, broken_off = threading.get_ident(), False
+        asker, broken_off, answer = threading.get_ident(), False, None
         with _breaking:
             _asking[asker] = False
         try:
@@ -584,6 +608,7 @@ class Solver:
                 broken_off = _asking.pop(asker)
             if broken_off:
                 _absorb()
+            self._broken = broken_off or answer not in (_z3().sat, _z3().unsat)
         return answer, broken_off
 
     def _give(self, steps: int) -> None:
@@ -608,6 +633,7 @@ class Solver:
 
     def script(self) -> str:
         """Spell all that is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
+        self._mend()
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"
 
     def refutations(self) -> str:
