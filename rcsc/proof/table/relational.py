@@ -74,6 +74,8 @@ _STEPS_OF_A_QUESTION = 4_000
 """What it costs to put a question about a region into Z3's words."""
 _NODES_OF_A_LINE = 500
 """Nodes in which an input is looked for that a line matches, before the solver is asked."""
+_OF_A_LINE = 10
+"""Whether a line can match may take this part of a question's steps: about a second over doubles, of which Z3 may take all and not know."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
@@ -438,7 +440,7 @@ class _Decision:
         if smt.gives_up("what no line matches"):
             return False
         if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
-            return self.holds(self.asked.none()) is Answer.UNSATISFIABLE
+            return not self.tried_by() and self.holds(self.asked.none()) is Answer.UNSATISFIABLE
         return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
 
     def missed(self, asked: Question) -> Answer:
@@ -542,7 +544,7 @@ class _Decision:
         self.few |= not all(dead.values())
         doubtful: list[int] = []
         for at in sorted(at for at, _ in open_ if at not in dead):
-            answer = Answer.SATISFIABLE if self.tried_by(at) else self.holds(self.asked.line(at))
+            answer = Answer.SATISFIABLE if self.tried_by(at) else self.matches(at)
             if answer is Answer.UNSATISFIABLE:
                 dead[at] = self.excluded_only(at)
                 self.few |= not dead[at]
@@ -550,6 +552,11 @@ class _Decision:
                 doubtful.append(at)
         findings: list[TableFinding] = [DeadLine(at, dead[at]) for at in sorted(dead)]
         return [*findings, Undecided(self.doubt(doubtful))] if doubtful else findings
+
+    def matches(self, at: int) -> Answer:
+        """Ask Z3 whether a line can match, with a part of a question's steps: of doubles it may take all without an answer."""
+        with smt.together(self.options.steps // _OF_A_LINE):
+            return self.holds(self.asked.line(at))
 
     def doubt(self, lines: Sequence[int]) -> str:
         """Name the lines of which it is not known whether they match."""
