@@ -42,7 +42,7 @@ from rcsc.proof.solvers.options import Options
 from rcsc.run.episodes.episode import Restart
 from rcsc_cell.episodes.episode import Episode, Interruption, SwitchTo
 from rcsc_cell.episodes.loop import Loop
-from tests.matrix import ACQUIRE, project
+from tests.cell.matrix import ACQUIRE, project
 from tests.support.faults_made import LEVELS, Fault, sample
 from tests.support.programs.stages import emitted
 

@@ -24,7 +24,7 @@ from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import PropertyClass
 from rcsc_cell.properties.failing import REASONS
 from rcsc_cell.properties.truth import CountsTrue, DoneTrue
-from tests.matrix import BUGS, Bug, findings, project, seed
+from tests.cell.matrix import BUGS, Bug, findings, project, seed
 from tests.support.loops import ACQUIRE, TBOX, played
 
 EVER = 99_999
@@ -46,7 +46,7 @@ def test_every_property_has_a_bug_and_a_place() -> None:
 
 
 OF_THE_CELL = [bug for bug in BUGS if bug.property not in OF_ANY_SYSTEM]
-"""The others: `python -m tests.matrix`, and `tests.episodes.test_any_system` for another system."""
+"""The others: `python -m tests.cell.matrix`, and `tests.episodes.test_any_system` for another system."""
 
 
 @pytest.mark.parametrize("bug", OF_THE_CELL, ids=[bug.property for bug in OF_THE_CELL])

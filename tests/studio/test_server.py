@@ -23,7 +23,7 @@ from rcsc.desk.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
 from rcsc.front.commands import run as rcsc
 from tests.studio.driven import DOCK, Seat
 from tests.studio.served import PATIENCE_S, Page, Refused, page, page_at, serving, until
-from tests.support.strangers import STRANGERS, held_beside
+from tests.studio.strangers import STRANGERS, held_beside
 
 
 class Echo(Concern):

@@ -1,4 +1,4 @@
-"""Seeded bugs and the properties that catch them: `python -m tests.matrix` prints which catches which.
+"""Seeded bugs and the properties that catch them: `python -m tests.cell.matrix` prints which catches which.
 
 A bug is a change to the text of a table. Where the changed table still proves, it is compiled as ever; where it does not, its executors
 are made all the same, which only tests can: rcsc has no option that skips a proof.
@@ -27,7 +27,7 @@ from tests.support import loops
 from tests.support.programs.stages import emitted
 from tests.support.programs.texts import one_row_a_line
 
-REPO = Path(__file__).parents[1]
+REPO = Path(__file__).parents[2]
 ACQUIRE = replace(loops.ACQUIRE, executor="python")
 FAR = Episode(executor="python", rows=("MOVE,,,BUFFER-SAFE,",))
 MOST_TICKS = 1600

@@ -19,7 +19,7 @@ from tests.sets import (
     whole,
 )
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 ROOMS = {path.parent.name for path in HERE.glob("*/test_*.py")}
 
 

@@ -3,13 +3,16 @@
 import doctest
 import importlib
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from rcsc.front.commands.group import COMMANDS
 
-REPO = Path(__file__).parents[1]
+REPO = Path(__file__).parents[2]
+MOST_MODULES = 12
+"""Of a room, beside its `__init__`."""
 ROOMS = sorted(
     str(path.parent.relative_to(base)).replace("/", ".")
     for base, package in ((REPO, "rcsc"), (REPO / "sim", "rcsc_cell"))
@@ -33,6 +36,16 @@ def test_a_room_teaches_what_is_in_it(room: str) -> None:
     assert (4 if ".compose" in room else 14) <= lines <= 62, lines
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
     assert found.failed == 0
+
+
+def test_a_room_has_at_most_twelve_modules() -> None:
+    """What one person holds in the mind; a room that grows past it becomes two, or gives up what another does."""
+    modules = [path for top in ("rcsc", "sim", "tests") for path in (REPO / top).rglob("*.py")]
+    many = Counter(
+        path.parent for path in modules if path.name != "__init__.py" and "generated" not in path.parts
+    )
+    assert len(many) > 50
+    assert not {str(room): count for room, count in many.items() if count > MOST_MODULES}
 
 
 def test_most_rooms_show_an_example() -> None:
