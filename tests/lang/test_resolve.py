@@ -9,6 +9,7 @@ import pytest
 from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.base.diagnostics.source import Source
 from rcsc.lang.interpret import call, evaluate, holds
+from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     Assign,
     Call,
@@ -564,6 +565,26 @@ table t {
   | a    | CELLS ||
 }
 """
+
+
+@pytest.mark.parametrize(
+    ("kind", "member"),
+    [
+        ("int 0 .. 9", "1"),
+        ("int 0 .. 9", "2 .. 5"),
+        ("int 0 .. 255", "0bx0xx_1010"),
+        ("real 0.0 .. 1.0", "0.5"),
+    ],
+)
+def test_a_set_that_names_sets_has_each_member_once(kind: str, member: str) -> None:
+    """Thirty sets, each of which names the one before three times, would have 3**30 members."""
+    sets = "".join(f"set s{at + 1} : {kind} = {{s{at}, s{at}, s{at}}}\n" for at in range(30))
+    first = f"set s0 : {kind} = {{{member}}}\n"
+    rows = "| in | in s30 || true |\n| out | not in s30 || false |\n"
+    text = f"{first}{sets}input a : {kind}\noutput o : bool\ntable t {{\n| line | a || o |\n{rows}}}\n"
+    [table] = program_of(text).tables
+    [test] = [each for each in table.lines[0].tests if each is not None]
+    assert len(list(parts(test.condition))) < 50
 
 
 @pytest.mark.parametrize(

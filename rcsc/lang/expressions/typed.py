@@ -603,13 +603,15 @@ def _value(scope: Scope, subject: Typed, element: Typed) -> Value | None:
 def _parts(scope: Scope, body: Body, members: tuple[tree.Member, ...], want: Scalar) -> list[_Part] | None:
     """Return the members, with those of a named set, in declared order, in its place; None after an error."""
     every: list[_Part] = []
+    met: set[object] = set()  # a set that names sets has each member once: they would multiply
     for member in members:
         name = _set_name(scope, body, member)
         if name is not None:
             its = named_set(scope, name)
             if its is None:
                 return None
-            every += its
+            every += [part for part in its if _key(part) not in met]
+            met |= set(map(_key, its))
             continue
         assert not isinstance(member, tree.NamedSet)
         part = _part(scope, body, member, want)
@@ -617,6 +619,15 @@ def _parts(scope: Scope, body: Body, members: tuple[tree.Member, ...], want: Sca
             return None
         every.append(part)
     return every
+
+
+def _key(part: _Part) -> object:
+    """Return what tells a member of a named set from another."""
+    if isinstance(part, _Range):
+        return _key(part.low), _key(part.high)
+    if isinstance(part, tree.Mask):
+        return part.text
+    return part.expr.value if isinstance(part.expr, Literal) else part
 
 
 def _part(scope: Scope, body: Body, member: tree.Expr | tree.Range, want: Scalar) -> _Part | None:
