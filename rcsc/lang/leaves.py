@@ -1,19 +1,23 @@
-"""Walks over expressions and statements: their parts, the same with other parts, and the leaves that they read and write; free names."""
+"""Walks over expressions and statements: their parts, the same with other parts, and who reads and writes which leaf; free names."""
 
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from typing import assert_never
 
 from rcsc.lang.model import (
+    BEFORE,
     Among,
     Apply,
     Assign,
     Call,
     Case,
+    Default,
     Expr,
     For,
     If,
+    Line,
     Literal,
     Local,
     Op,
@@ -24,11 +28,13 @@ from rcsc.lang.model import (
     Real,
     Select,
     Statement,
+    Table,
     ToElement,
     ToLeaf,
     ToLocal,
     VariableName,
     earlier,
+    pending,
 )
 
 
@@ -202,6 +208,77 @@ def written_by(statement: Statement) -> tuple[VariableName, ...]:
             return leaves
         case ToLocal():
             return ()
+
+
+class Uses:
+    """Who reads and who writes each leaf of a program, as it says itself: calls count where the procedure is, not for what it does.
+
+    Attributes:
+        written, read: By leaf, users (`table NAME`, `procedure NAME`, `level NAME`, `deferral NAME`, `assumption NAME` and the like), and
+            of tables the lines.
+        requirements: By leaf, those of its users.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.written: dict[VariableName, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+        self.read: dict[VariableName, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+        self.requirements: dict[VariableName, dict[str, None]] = defaultdict(dict)
+        for procedure in program.procedures:
+            self._procedure(procedure)
+        for table in program.tables:
+            for line in table.every_line:
+                self._line(table, line)
+        for level in program.levels:
+            for selector in level.selectors:
+                self._reads(f"level {level.name}", "", selector, ())
+        for variable in program.variables:
+            if variable.deferred_until is not None:
+                name, next_ = f"deferral {variable.name}", (pending(variable.name),)
+                self._reads(name, "", variable.deferred_until, ())
+                self._note(self.read, name, "", next_, ())
+                self._note(self.written, name, "", (variable.name,), ())
+        for sort, claims in (
+            ("assumption", program.assumptions),
+            ("invariant", program.invariants),
+            ("property", program.properties),
+        ):
+            for claim in claims:
+                self._reads(f"{sort} {claim.name}", "", claim.condition, claim.requirements)
+
+    def _procedure(self, procedure: Procedure) -> None:
+        """Note what a procedure itself reads and writes; of an `extern` one, what it is declared to."""
+        name = f"procedure {procedure.name}"
+        if procedure.extern is not None:
+            self._note(self.read, name, "", procedure.reads, procedure.requirements)
+            self._note(self.written, name, "", procedure.writes, procedure.requirements)
+        self._body(name, "", procedure.body, procedure.requirements)
+
+    def _line(self, table: Table, line: Line | Default) -> None:
+        name, answers = f"table {table.name}", line.requirements or table.requirements
+        for test in line.tests if isinstance(line, Line) else ():
+            if test is not None:
+                self._reads(name, line.name, test.condition, answers)
+        self._body(name, line.name, [action.statement for action in line.actions], answers)
+
+    def _body(self, name: str, line: str, body: Iterable[Statement], answers: Sequence[str]) -> None:
+        for statement in everything(body):
+            self._note(self.written, name, line, written_by(statement), answers)
+            for expr in expressions(statement):
+                self._reads(name, line, expr, answers)
+
+    def _reads(self, name: str, line: str, expr: Expr, answers: Sequence[str]) -> None:
+        leaves = (VariableName(leaf.removeprefix(BEFORE)) for leaf in read_by(expr))
+        self._note(self.read, name, line, leaves, answers)
+
+    def _note(
+        self, into: Mapping[VariableName, dict[str, list[str]]], name: str, line: str, leaves: Iterable[VariableName],
+        answers: Sequence[str],
+    ) -> None:  # fmt: skip
+        for leaf in dict.fromkeys(leaves):
+            lines = into[leaf][name]
+            if line and line not in lines:
+                lines.append(line)
+            self.requirements[leaf].update(dict.fromkeys(answers))
 
 
 def free_name(name: str, taken: Container[str]) -> str:

@@ -98,6 +98,8 @@ def _of_tables() -> Iterator[Step]:
         yield Step(f"diff-{form}", ("diff", *versions, "--format", form))
     yield Step("trace", ("trace", "task/acquire.rcs", "--out", "trace", "--no-vectors"), ("tables/trace/*",))
     yield Step("trace-find", ("trace", "task/acquire.rcs", "--find", "acquire 1"))
+    yield Step("names", ("names",))
+    yield Step("names-files", ("names", "-o", "names.html"), ("tables/names.html",))
     yield Step("db-check", ("db", "check"))
     yield Step("db-build", ("db", "build", "-o", "cell.db"))
     yield Step("db-show", ("db", "show", "--database", "cell.db"))

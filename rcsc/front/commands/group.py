@@ -38,6 +38,7 @@ COMMANDS = {
     "tables.graph": "Draw a table's state graph.",
     "systems.log": "Say what a recorded run did.",
     "tables.lsp": "Serve an editor as tables are typed.",
+    "tables.names": "List the variables of a system: its data dictionary.",
     "new": "Make a small project.",
     "systems.prove": "Prove the levels of a system together, for any delay.",
     "systems.replay": "Run a recorded run again and compare.",

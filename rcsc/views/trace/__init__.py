@@ -15,5 +15,5 @@ Trusted: what the templates and the emitter say of their lines. Whether the code
 
 Modules: `matrix` (all of one program), `proofs` (verdicts, and properties as far as they are
 known), `requirements` (against a list), `tables_of` (CSV and JSON), `page` (HTML), `answer` (one question), `collect` (all of it, for
-the command).
+the command), `names` (the data dictionary).
 """

@@ -55,30 +55,36 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
         *_requirements(places(matrices), listed),
         *(part for one in matrices for part in _program(one)),
     ]
+    return framed("Traceability", body)
+
+
+def framed(title: str, body: Iterable[str]) -> str:
+    """Return a page of these parts, which needs no script and no other file."""
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n<meta name="color-scheme" content="light dark">\n'
-        f'<link rel="icon" href="data:,">\n<title>Traceability</title>\n<style>\n{palette()}{_STYLE}</style>\n</head>\n<body>\n'
+        f'<link rel="icon" href="data:,">\n<title>{escape(title)}</title>\n<style>\n{palette()}{_STYLE}</style>\n</head>\n<body>\n'
         + "\n".join(body)
         + "\n</body>\n</html>\n"
     )
 
 
-def _table(headings: Mapping[str, int], rows: Iterable[str]) -> str:
+def tabled(headings: Mapping[str, int], rows: Iterable[str]) -> str:
     """Return a table; the width of each column in per cent."""
     columns = "".join(f'<col style="width: {width}%">' for width in headings.values())
     heads = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
     return f"<table><colgroup>{columns}</colgroup><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
 
-def _row(*cells: str, name: str = "") -> str:
+def row(*cells: str, name: str = "") -> str:
     """Return a row of cells that are HTML; a name that others can point at."""
     mark = f' id="{escape(name)}"' if name else ""
     return f"<tr{mark}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
-def _listing(words: Iterable[str], style: str = "") -> str:
+def listing(words: Iterable[str], style: str = "") -> str:
+    """Return words one below the other, as a cell."""
     cell = "<br>".join(map(escape, words))
     return f'<span class="{style}">{cell}</span>' if style and cell else cell
 
@@ -93,10 +99,10 @@ def _requirements(known: Mapping[str, Sequence[str]], listed: Sequence[str]) -> 
         yield f"<p>{sum(name in known for name in listed)} of {len(listed)} in the list have a place.</p>"
     rows = []
     for name in names:
-        where = _listing(known[name]) if name in known else '<span class="bad">nothing is for it</span>'
+        where = listing(known[name]) if name in known else '<span class="bad">nothing is for it</span>'
         note = ' <span class="bad">not in the list</span>' if listed and name not in listed else ""
-        rows.append(_row(f'<span class="for">{escape(name)}</span>{note}', where))
-    yield _table({"requirement": 25, "named by": 75}, rows)
+        rows.append(row(f'<span class="for">{escape(name)}</span>{note}', where))
+    yield tabled({"requirement": 25, "named by": 75}, rows)
 
 
 def _program(matrix: Matrix) -> Iterator[str]:
@@ -108,17 +114,17 @@ def _program(matrix: Matrix) -> Iterator[str]:
         known = f"{proof.verdict}: {proof.method}{f'; rests on {rests}' if rests else ''}"
         matched = [("matched in", matrix.of(Origin(Sort.TABLE, name)))]
         code = "; ".join(_where(matched, ends) for ends in ((".c",), (".py",)))
-        names = _listing([", ".join(matrix.requirements.get(name, ()))], "for")
+        names = listing([", ".join(matrix.requirements.get(name, ()))], "for")
         yield f"<h3>Table {escape(name)} {names}</h3>"
         yield f"<p>{escape(known)}.<br>{code}.</p>"
-        yield _table(
+        yield tabled(
             {"line": 10, "for": 7, "when": 22, "does": 15, "C": 13, "Python": 12, "vectors": 10, "shown": 11},
             (_line(matrix, line) for line in own),
         )
     if matrix.declared:
         yield "<h3>Procedures, assumptions, invariants and properties</h3>"
         widths = {"what": 16, "for": 10, "states": 30, "used by": 26, "known": 18}
-        yield _table(widths, map(_declared, matrix.declared))
+        yield tabled(widths, map(_declared, matrix.declared))
     yield from _code(matrix)
 
 
@@ -137,15 +143,15 @@ def _line(matrix: Matrix, line: TracedLine) -> str:
     spoken = ", ".join(name for name, _ in line.properties)
     proved = [*line.findings, *([f"properties: {spoken}"] if spoken else [])]
     shown = f"{tests.shown} of {tests.conditions}" if tests.conditions else ""
-    return _row(
+    return row(
         f'<b>{escape(line.name)}</b><br><span class="soft">{_place(line.place.rpartition("/")[2])}</span>',
-        _listing(line.requirements, "for"),
-        _listing([*line.states]) + (f'<br><span class="soft">{_listing(proved)}</span>' if proved else ""),
-        _listing(line.does),
+        listing(line.requirements, "for"),
+        listing([*line.states]) + (f'<br><span class="soft">{listing(proved)}</span>' if proved else ""),
+        listing(line.does),
         _where(code, (".c",)),
         _where(code, (".py",)),
         _numbered("show", tests.made) + _numbered("take", tests.taken),
-        shown + (f'<br><span class="soft">{_listing(tests.unshown)}</span>' if tests.unshown else ""),
+        shown + (f'<br><span class="soft">{listing(tests.unshown)}</span>' if tests.unshown else ""),
         name=f"{matrix.program}-{line.table}-{line.name}",
     )
 
@@ -188,9 +194,9 @@ def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...])
 
 
 def _declared(one: Declared) -> str:
-    return _row(
+    return row(
         f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(one.place)}</span>',
-        _listing(one.requirements, "for"),
+        listing(one.requirements, "for"),
         escape(one.states),
         escape(", ".join(one.used)),
         escape(one.proof),
@@ -207,7 +213,7 @@ def _code(matrix: Matrix) -> Iterator[str]:
         ordered = sorted(pieces, key=lambda piece: (piece.first, -piece.last))
         yield f"<p><code>{escape(file)}</code>, SHA-256 <code>{matrix.files.get(file, '')[:16]}</code></p>"
         joined = (list(same) for _, same in groupby(ordered, key=lambda piece: piece.origin))
-        yield _table(widths, (_piece(matrix, same) for same in joined))
+        yield tabled(widths, (_piece(matrix, same) for same in joined))
 
 
 def _piece(matrix: Matrix, same: list[Piece]) -> str:
@@ -215,10 +221,10 @@ def _piece(matrix: Matrix, same: list[Piece]) -> str:
     names = list(dict.fromkeys(piece.name for piece in same if piece.name))
     named = ", ".join(names) if len(names) < 4 else f"{names[0]}, {names[1]} and {len(names) - 2} more"
     words = escape(origin.words)
-    return _row(
+    return row(
         _unbroken(f"{same[0].first}-{max(piece.last for piece in same)}"),
         f"<code>{escape(named)}</code>" if named else "",
         f'<span class="soft">infrastructure: {words}</span>' if origin.sort is Sort.INFRASTRUCTURE else words,
         _place(matrix.place(origin)),
-        _listing(matrix.answers(origin), "for"),
+        listing(matrix.answers(origin), "for"),
     )

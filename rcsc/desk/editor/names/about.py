@@ -10,7 +10,7 @@ from rcsc.desk.editor.grid import type_text
 from rcsc.desk.editor.names.find import Names
 from rcsc.desk.editor.names.index import Occurrence, Space
 from rcsc.desk.editor.values import Grid, Standing
-from rcsc.lang.leaves import everything, read_by, written_by
+from rcsc.lang.leaves import Uses, read_by
 from rcsc.lang.model import (
     Array,
     Call,
@@ -127,25 +127,18 @@ def _variable(program: Program, declared: Declared) -> Iterator[str]:
 
 
 def _writers(program: Program, leaves: set[str]) -> Iterator[str]:
-    """Yield procedures that write a leaf themselves, and lines that do."""
-    for procedure in program.procedures:
-        own = {str(leaf) for statement in everything(procedure.body) for leaf in written_by(statement)}
-        if procedure.extern is not None:
-            own |= set(map(str, procedure.writes))
-        if own & leaves:
-            yield f"`{procedure.name}`"
-    for table in program.tables:
-        lines = [
-            str(line.name)
-            for line in table.every_line
-            if any(
-                leaves & set(map(str, written_by(action.statement)))
-                for action in line.actions
-                if not isinstance(action.statement, Call)
-            )
-        ]
-        if lines:
-            yield f"table `{table.name}` in {_listed([f'`{line}`' for line in lines])}"
+    """Yield procedures that write a leaf themselves, and tables with the lines that do."""
+    users: dict[str, list[str]] = {}
+    for leaf, by in Uses(program).written.items():
+        for name, lines in by.items() if leaf in leaves else ():
+            users[name] = list(dict.fromkeys((*users.get(name, ()), *lines)))
+    for name, lines in users.items():
+        sort, _, own = name.partition(" ")
+        yield (
+            f"`{own}`"
+            if sort == "procedure"
+            else f"{sort} `{own}` in {_listed([f'`{line}`' for line in lines])}"
+        )
 
 
 def _range(kind: Type) -> str:
