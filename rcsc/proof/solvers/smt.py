@@ -457,17 +457,27 @@ class Solver:
     with it has ended by a null pointer in Z3 (5.4), and to drop assertions from it can take Z3 for ever. So it is dropped, and what
     was asserted is stated to a new one.
 
+    Args:
+        limits: Of each question.
+        remembers: Whether `refuted` is kept.
+        counted_alone: Whether Z3 leaves out the cuts of integers by Hermite normal forms: it does not count what they take, which
+            was 40 s where two versions of a table with masks of 64 bits were compared.
+
     Attributes:
         queries: How often it was asked.
         refuted: If it remembers: for each unsatisfiable answer, the assertions that are not permanent.
         names: How many constants stand for terms.
     """
 
-    def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
+    def __init__(
+        self, limits: Limits = Limits(), *, remembers: bool = False, counted_alone: bool = False
+    ) -> None:
         _z3().set_param("memory_max_size", limits.memory_mb)
         self._steps = self._given = limits.steps
         self._cpu_s = self._patience_s = limits.cpu_s
         self._seed = 0
+        self._counted_alone = counted_alone
+        self._incremental = False
         self._asserted: list[list[Term]] = [[]]
         self._begin()
         self.queries = 0
@@ -483,8 +493,13 @@ class Solver:
         self._solver.set("rlimit", self._given)
         self._wait()
         self._solver.set("random_seed", self._seed)
+        if self._counted_alone:
+            self._solver.set("arith.enable_hnf", False)
         permanent, *pushed = self._asserted
         self._solver.add(*permanent)
+        if self._incremental:  # until something is pushed Z3 asks another solver than it did before
+            self._solver.push()
+            self._solver.pop()
         for terms in pushed:
             self._solver.push()
             self._solver.add(*terms)
@@ -526,6 +541,7 @@ class Solver:
     def push(self) -> None:
         """Remember what is asserted now, for `pop`."""
         self._asserted.append([])
+        self._incremental = True
         if not self._broken:
             self._solver.push()
 
@@ -544,6 +560,7 @@ class Solver:
         z3 = _z3()
         self.queries += 1
         self._mend()
+        self._incremental |= bool(assuming)
         self._give(min([self._steps, *(budget.left for budget in _own.budgets)]))
         try:
             answer, why = self._answer(assuming)

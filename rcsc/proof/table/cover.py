@@ -81,7 +81,7 @@ class Space:
 
     def solver(self, *nodes: Node) -> Solver:
         """Return a solver that knows the domain, and that these hold."""
-        solver = Solver(self.options.limits)
+        solver = Solver(self.options.limits, counted_alone=True)
         solver.add(*values.domain(self.nodes.values()), *map(values.term_of, nodes))
         return solver
 
