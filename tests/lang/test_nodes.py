@@ -314,10 +314,11 @@ def test_a_question_is_asked_again_with_four_times_the_patience_until_the_proces
             if name == "timeout":
                 given.append(value)
 
-        def statistics(self) -> list[object]:
-            return []
+        def add(self, *_: object) -> None:
+            """What was asserted is stated again."""
 
     monkeypatch.setattr(solver, "_solver", Asked())
+    monkeypatch.setattr(z3, "Solver", Asked)
     monkeypatch.setattr(smt, "time", SimpleNamespace(monotonic=lambda: clock[0], thread_time=lambda: used[0]))
     before = smt.cut_short()
     assert solver.check() is Answer.UNKNOWN

@@ -491,7 +491,8 @@ class Solver:
         self._solver: Any = _z3().Solver()
         self._broken = False
         self._solver.set("rlimit", self._given)
-        self._wait()
+        # Past so much time a question ends; on a busy machine that is more than the time that it gets.
+        self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
         self._solver.set("random_seed", self._seed)
         if self._counted_alone:
             self._solver.set("arith.enable_hnf", False)
@@ -610,8 +611,7 @@ class Solver:
                 _cut.append(round(used_s))
                 return answer, why
             self._patience_s *= 4
-            self._mend()
-            self._wait()
+            self._begin()
 
     def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
         """Return Z3's answer, and whether it was broken off."""
@@ -643,10 +643,6 @@ class Solver:
         used = self._count() - before
         for budget in _own.budgets:
             budget.left -= used
-
-    def _wait(self) -> None:
-        """Make Z3 end a question after so much time has passed; on a busy machine that is more than the time that it gets."""
-        self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
 
     def script(self) -> str:
         """Spell all that is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
