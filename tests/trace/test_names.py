@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from rcsc.desk.editor.names.about import _writers
 from rcsc.front.commands import run
 from rcsc.lang.interpret import cycle, initial
 from rcsc.lang.leaves import Uses
@@ -163,3 +164,13 @@ def test_a_word_chooses_and_tables_that_are_not_in_order_are_told(
     assert run(["names", str(door)]) == 1
     told = capsys.readouterr()
     assert "RCS201" in told.out + told.err
+
+
+def test_the_hover_says_the_same_writers() -> None:
+    program = program_of(DOOR)
+    said = {leaf: list(_writers(program, {leaf})) for leaf in ("at", "turn", "left[0]")}
+    assert said == {
+        "at": ["table `press_once` in `go`, `stop`"],
+        "turn": ["deferral `turn`"],
+        "left[0]": ["`hold`"],
+    }

@@ -29,7 +29,7 @@ from rcsc.lang.model import (
     spell,
     unit_text,
 )
-from rcsc.lang.restart import After, Fixed, SameAs, Stands
+from rcsc.lang.restart import Adopted, After, Fixed, SameAs, Stands
 from rcsc.run.description import Description
 from rcsc.views.trace.page import framed, listing, row, tabled
 
@@ -52,9 +52,9 @@ class NamedVariable:
     Attributes:
         level: The level, or the program where it is none.
         kind: `input`, `state` or `output`.
-        lowest, highest: Its range; empty for words and truth values, whose values are `members`.
+        lowest, highest: Its range; empty for words, whose values are `members`, and for truth values.
         restart: Its value when the level starts anew; its initial one, where nothing else is declared.
-        comes_from: Who fills it: a buffer's other end, a query of the database, or nobody; only of inputs.
+        comes_from: Other ends of buffers and queries of the database that fill it; only of inputs.
         goes_to: The other ends of buffers that take it.
         written_by, read_by: Tables with their lines, procedures and claims.
         requirements: Of all that writes or reads it.
@@ -83,7 +83,7 @@ class NamedVariable:
     def range(self) -> str:
         """Its type with its range or members, and its unit."""
         within = f" {self.lowest} .. {self.highest}" if self.lowest else ""
-        among = f" of {', '.join(self.members)}" if self.members and self.type != "bool" else ""
+        among = f" of {', '.join(self.members)}" if self.members else ""
         return f"{self.type}{within}{among}{f' {self.unit}' if self.unit else ''}"
 
 
@@ -98,11 +98,12 @@ def named(
         system: The system, for its buffers and queries.
     """
     uses, level = Uses(program), _level(program, system)
-    declared = {leaf: one for one in program.declared for leaf in one.leaves}
+    declared, adopted = {leaf: one for one in program.declared for leaf in one.leaves}, program.adopted
     for variable in program.variables:
         if not (variable.previous_of or variable.line_of or variable.counts is not None):
             meaning = _meaning(declared.get(variable.name), variable)
-            yield _named(program, variable, meaning, uses, level, places, system)
+            restart = _restart(variable, adopted.get(str(variable.name)))
+            yield _named(variable, meaning, restart, uses, level, places, system)
 
 
 def _level(program: Program, system: Description | None) -> str:
@@ -112,7 +113,7 @@ def _level(program: Program, system: Description | None) -> str:
 
 
 def _named(
-    program: Program, variable: Variable, meaning: str, uses: Uses, level: str, places: Mapping[str, str], system: Description | None
+    variable: Variable, meaning: str, restart: str, uses: Uses, level: str, places: Mapping[str, str], system: Description | None
 ) -> NamedVariable:  # fmt: skip
     kind, name = variable.type, variable.name
     low, high = _ends(kind)
@@ -120,7 +121,7 @@ def _named(
     return NamedVariable(
         level=level, name=str(name), kind=variable.kind.value, type=_word(kind), lowest=low, highest=high,
         members=kind.members if isinstance(kind, Enum) else (), unit=unit_text(kind.unit) if isinstance(kind, Int | Real) else "",
-        initial=spell(kind, variable.initial), restart=_restart(program, variable), meaning=meaning,
+        initial=spell(kind, variable.initial), restart=restart, meaning=meaning,
         comes_from=comes_from, goes_to=goes_to, written_by=_listed(uses.written.get(name, {})), read_by=_listed(uses.read.get(name, {})),
         requirements=tuple(uses.requirements.get(name, ())), place=places.get(str(name), ""),
     )  # fmt: skip
@@ -156,11 +157,11 @@ def _ends(kind: Scalar) -> tuple[str, str]:
     return (spell(kind, kind.low), spell(kind, kind.high)) if isinstance(kind, Int | Real) else ("", "")
 
 
-def _restart(program: Program, variable: Variable) -> str:
+def _restart(variable: Variable, adopted: Adopted | None) -> str:
     """Return what a variable has when its level starts anew; an input has what its buffer brings."""
     if variable.kind is Kind.INPUT:
         return ""
-    match program.adopted.get(str(variable.name)):
+    match adopted:
         case Fixed(value):
             return spell(variable.type, value)
         case SameAs(leaf):
@@ -178,22 +179,15 @@ def _buffers(system: Description | None, level: str, name: str) -> tuple[tuple[s
     if system is None:
         return (), ()
 
-    def holds(whole: str) -> bool:
-        return (
-            f"{level}.{name}" == whole or re.match(rf"{re.escape(whole)}[.\[]", f"{level}.{name}") is not None
-        )
+    full = f"{level}.{name}"
 
-    fed = [
-        feed.query
-        for spec in system.levels
-        if spec.name == level
-        for feed in spec.feeds
-        if holds(f"{level}.{feed.into}")
-    ]
+    def holds(whole: str) -> bool:
+        return full == whole or full.startswith((f"{whole}.", f"{whole}["))
+
+    feeds = [(spec.name, feed) for spec in system.levels for feed in spec.feeds]
     brought = [wire.source for wire in system.wires if holds(wire.target)]
-    return (*brought, *(f"database {query}" for query in fed)), tuple(
-        wire.target for wire in system.wires if holds(wire.source)
-    )
+    brought += [f"database {feed.query}" for owner, feed in feeds if holds(f"{owner}.{feed.into}")]
+    return tuple(brought), tuple(wire.target for wire in system.wires if holds(wire.source))
 
 
 def _listed(users: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

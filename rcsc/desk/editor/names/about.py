@@ -134,11 +134,8 @@ def _writers(program: Program, leaves: set[str]) -> Iterator[str]:
             users[name] = list(dict.fromkeys((*users.get(name, ()), *lines)))
     for name, lines in users.items():
         sort, _, own = name.partition(" ")
-        yield (
-            f"`{own}`"
-            if sort == "procedure"
-            else f"{sort} `{own}` in {_listed([f'`{line}`' for line in lines])}"
-        )
+        place = f" in {_listed([f'`{line}`' for line in lines])}" if lines else ""
+        yield f"{'' if sort == 'procedure' else f'{sort} '}`{own}`{place}"
 
 
 def _range(kind: Type) -> str:
