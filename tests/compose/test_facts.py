@@ -219,6 +219,21 @@ def test_a_fact_holds_of_what_the_reader_begins_with(first: str, begins: bool, t
     assert whole.proved == begins
 
 
+def test_a_fact_holds_of_what_stands_in_the_buffer_at_a_restart(tmp_path: Path) -> None:
+    """What is never published, and is not what the reader begins with, does not stand there either."""
+    given = "input there : bool", "input there : bool\ninput wide : int 0 .. 9"
+    table = (
+        "table go {",
+        "assume fact assumed : wide <= 4\nproperty stood : was wide <= 4\nproperty less : was wide <= 3\ntable go assuming fact {",
+    )
+    upper = small_text("upper", ("input lower", "output wide : int 0 .. 4\ninput lower"))
+    path = small_system(tmp_path, upper=upper, lower=small_text("lower", given, table))
+    path.write_text(f'{path.read_text(encoding="utf-8")}"upper.wide" = "lower.wide"\n', encoding="utf-8")
+    whole = prove_system(path, LITTLE)
+    assert whole.of("lower", (Sort.PROPERTY, "", "stood")).verdict is Verdict.PROVED
+    assert whole.of("lower", (Sort.PROPERTY, "", "less")).verdict is Verdict.NOT_PROVED
+
+
 WRITES = """
 input x : int 0 .. 9
 output o : int 0 .. 9

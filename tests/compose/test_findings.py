@@ -270,6 +270,17 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
     assert others.keys() == {name for name in usual if first[name] != usual[name]}
 
 
+def test_no_neighbour_that_began_with_it_finds_an_echo_of_more_than_it_ordered(tmp_path: Path) -> None:
+    text = small_text(
+        "lower",
+        ("table go {", "property ahead : was report.inc_command_echo <= was command.inc_command\ntable go {"),
+    )
+    ts = small_level(tmp_path, "lower", lower=text)
+    obligation = obligation_of(ts, Sort.PROPERTY, "", "ahead")
+    assert traces(ts, [obligation], TraceSearch(most=2, restarted=True))  # numbers may have gone round
+    assert traces(ts, [obligation], replace(LEGAL, most=2, restarted=True)) == {}
+
+
 def test_the_state_in_which_a_restart_begins_is_the_first_row(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -379,12 +379,16 @@ class TransitionSystem:
         order = [name for name in self.level.staged if name in numbers]
         return tuple((str(name), line_names(self.table(name))[numbers[name] - 1]) for name in order)
 
-    def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
+    def cycle(
+        self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None, *, anew: bool = False
+    ) -> Cycle:
         """Run one cycle symbolically from `before`; inputs default to fresh variables, named with the suffix.
 
-        Results of extern procedures are named with it, too: cycles in one query need different suffixes.
+        Results of extern procedures are named with it, too: cycles in one query need different suffixes. `anew`: `before` is the
+        state after a restart, in which inputs are what stood in the buffers: as other levels owe them, or as they are initially, which
+        is owed, too.
         """
-        cycle = self._admitted(before, suffix, taken)
+        cycle = self._admitted(before, suffix, taken, anew=anew)
         if not (self.refuses and self.refusable):
             return cycle
         return self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
@@ -433,14 +437,16 @@ class TransitionSystem:
         )
         return {name: node for name, node in shown if name in leaves}
 
-    def _admitted(self, before: Leaves, suffix: str, taken: Leaves | None) -> Cycle:
+    def _admitted(self, before: Leaves, suffix: str, taken: Leaves | None, *, anew: bool) -> Cycle:
         """Return a cycle in which no input is refused."""
         if taken is None:
             taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}
         run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
-        contract = undeclared = values.all_of((self._protocol(before, taken), answers, self._given(taken)))
+        standing = self._given(before) if anew else TRUE
+        known = self._protocol(before, taken), answers, standing, self._given(taken)
+        contract = undeclared = values.all_of(known)
         run.settle(self.program)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
@@ -465,7 +471,7 @@ class TransitionSystem:
         return Cycle(
             before, taken, contract, middle, tables, after,
             run.ended, unmatched, interrupted, calls, settled, acted, undeclared, tuple(stages), tuple(seen),
-            strange=frozenset(self.clamped if self.refuses else ()),
+            strange=frozenset(self.clamped if self.refuses else ()), anew=anew,
         )  # fmt: skip
 
     def tables(self, choice: TableChoice, seen: Leaves, *, matched: bool) -> tuple[TableAt, ...]:

@@ -77,7 +77,8 @@ class TraceSearch:
         restarted: Begin as after a restart.
         legal: The superior's numbers come one after the other, and each report is of an order of this run, none older than the one
             before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
-            before a restart. Such a trace can happen to two levels that begin together.
+            before a restart. Such a trace can happen to two levels that begin together. After a restart no report echoes more than the
+            order that stands.
         start: Leaves that begin with other values than the initial ones.
         invariant: Begin in any state in which these clauses over these predicates hold, which need not be reached.
     """
@@ -196,8 +197,7 @@ class Unrolled:
         at = len(self.cycles) + 1
         if self.cycles:  # a fault would have ended the run
             self._run.add(self.cycles[-1].goes_on)
-        cycle = self.ts.cycle(self._now, f" {at}")
-        cycle = replace(cycle, anew=self.search.restarted and at == 1)
+        cycle = self.ts.cycle(self._now, f" {at}", anew=self.search.restarted and at == 1)
         self.cycles.append(cycle)
         self._now = cycle.after
         self._run.add(cycle.contract)
@@ -207,6 +207,8 @@ class Unrolled:
 
     def _legal(self, cycle: Cycle, at: int) -> Iterator[Node]:
         yield in_order(self.ts, cycle.before, cycle.taken)
+        if cycle.anew and (above := self.ts.links.above) is not None:
+            yield values.compare(Op.LE, cycle.before[above.echo], cycle.before[above.number])
         for below in self.ts.links.below:
             yield from self._answers(below, cycle, at)
 

@@ -290,7 +290,7 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
     """Return the cycles with which a level can begin, by name."""
     return {
         "first": ts.cycle(ts.initial(), " at first"),
-        "restart": replace(ts.cycle(ts.restarted(), " at restart"), anew=True),
+        "restart": ts.cycle(ts.restarted(), " at restart", anew=True),
     }
 
 
