@@ -171,6 +171,16 @@ def every_statement(program: Program) -> Iterator[Statement]:
             yield from everything(action.statement for action in line.actions)
 
 
+def every_expression(program: Program) -> Iterator[Expr]:
+    """Yield the expressions that a program tests, states and calculates."""
+    for stated in (program.assumptions, program.invariants, program.properties):
+        yield from (each.condition for each in stated)
+    for table in program.tables:
+        yield from (test.condition for test in table.distinct_tests)
+    for statement in every_statement(program):
+        yield from expressions(statement)
+
+
 def called_by(body: Iterable[Statement]) -> Iterator[str]:
     """Procedures that the statements themselves call, blocks included."""
     return (str(call.procedure) for call in everything(body) if isinstance(call, Call))

@@ -23,6 +23,7 @@ from rcsc.lang.project import load
 from rcsc.proof.relation.follow import following
 from rcsc.proof.relation.same import Differs, Same, compare
 from rcsc.proof.relation.steps import Steps
+from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver, Term
 from rcsc.views.graph.derive import Derived, derive
@@ -91,6 +92,30 @@ def test_the_states_are_asked_for_once_however_many_edges_there_are(
     drawn = graph_of(found_in(text, tmp_path), "s").graph
     assert len(drawn.edges) > 190
     assert len(asked) < 40 + 6 * 40 * 2 + 2 * len(drawn.edges)
+
+
+def test_what_does_not_look_at_the_state_is_asked_for_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Forty states, and lines of which most cells look at other variables."""
+    members = ", ".join(f"m{at}" for at in range(40))
+    declared = f"enum e {{ {members} }}\ninput a : int 0 .. 9\ninput b : int 0 .. 9\nstate s : e\n"
+    rows = "| n0 | > 3 | > 4 | < 8 | not in {m0} || 1 |\n| n1 | > 3 | < 3 | > 1 | /= m3 || 2 |\n"
+    text = f"{declared}output o : int 0 .. 2\ntable t {{\n| line | a | b | b | s || o |\n{rows}}}\n"
+    asked: list[Solver] = []
+    check = Solver.check
+
+    def counted(solver: Solver, *terms: Term) -> Answer:
+        asked.append(solver)
+        return check(solver, *terms)
+
+    entry = found_in(text, tmp_path)
+    steps = Steps(entry.program, entry.table, entry.program.variable("s"), OPTIONS)
+    states = steps.states()
+    monkeypatch.setattr(Solver, "check", counted)
+    needed = {steps.needed(line, state) for line in (0, 1) for state in states[4:]}
+    assert needed == {(0, 1, 2)}
+    assert len(asked) <= 36 * 4 + 8  # of a state its own cell alone, and each other cell once
 
 
 @pytest.mark.parametrize("form", [*EVERY_FORM, "svg"])
@@ -391,6 +416,23 @@ def test_what_an_edge_need_not_show_follows_from_the_state(tmp_path: Path) -> No
     edges = {edge.line: edge for edge in graph_of(entry, "at").graph.edges}
     assert (edges["5"].guard, edges["5"].shown) == ("seen > 0", "")  # the assumption says it
     assert edges["3"].shown == "seen = 3"
+
+
+def test_masks_of_many_bits_come_to_a_graph(tmp_path: Path) -> None:
+    """As numbers these words cost more steps than there are."""
+    members = ", ".join(f"m{at}" for at in range(40))
+    masks = (
+        "1xxx1x1xxx00xxxx0xxx01x0100xx0x0x1x00x11xxxxx1x0xxxx0x10xx10xx1x",
+        "00x10xxxxxx1xxx01x00x1xxxxxxx0xx01x01x1xx1xxxxx1x01101x0xxx001xx",
+    )
+    rows = f"| n0 above n1 | 0b{masks[0]} | not in {{m3}} || 1 |\n| n1 | /= 0b{masks[1]} | || 2 |\n| rest | DEFAULT | || 0 |\n"
+    for most in (2**64 - 1, 2**64 - 2**40):
+        declared = f"enum e {{ {members} }}\ninput d : int 0 .. {most}\nstate s : e\noutput o : int 0 .. 2\n"
+        entry = found_in(f"{declared}table t {{\n| line | d | s || o |\n{rows}}}\n", tmp_path)
+        with smt.together(3_000_000):
+            steps = Steps(entry.program, entry.table, entry.program.variable("s"), OPTIONS)
+            found = steps.steps(steps.states())
+        assert len(found) == 39 + 40 + 40
 
 
 # --- the comparison --------------------------------------------------------------------------

@@ -20,12 +20,13 @@ from rcsc.proof.symbolic.execution import Run
 
 HEAD = """input w : int 0 .. 18446744073709551615
 input v : int 0 .. 131071
+input u : int 5 .. 200000
 input n : int 0 .. 255
 input k : int -5 .. 5
 input s : bool
 output o : int 0 .. 1
 """
-WIDTHS = {"w": 64, "v": 17, "n": 8}
+WIDTHS = {"w": 64, "v": 17, "u": 18, "n": 8}
 
 
 def masks(name: str) -> st.SearchStrategy[str]:
@@ -40,9 +41,9 @@ def fields(name: str) -> st.SearchStrategy[str]:
     return ends.map(lambda two: f"{name}[{max(two)}..{min(two)}]")
 
 
-words = st.sampled_from(("w", "v", "n"))
+words = st.sampled_from(("w", "v", "u", "n"))
 edges = st.sampled_from(
-    (0, 1, 2, 3, 7, 255, 256, 65535, 65536, 131070, 131071, 2**31, 2**63 - 1, 2**63, 2**64 - 1)
+    (0, 1, 2, 3, 5, 7, 255, 256, 65535, 65536, 131070, 131071, 200_000, 2**31, 2**63 - 1, 2**63, 2**64 - 1)
 )
 numbers = st.recursive(
     st.one_of(words, st.just("k"), words.flatmap(fields), edges.map(str)),
@@ -73,6 +74,7 @@ points = st.fixed_dictionaries(
     {
         "w": st.one_of(edges, st.integers(0, 2**64 - 1)),
         "v": st.one_of(edges.map(lambda edge: edge % 2**17), st.integers(0, 2**17 - 1)),
+        "u": st.one_of(st.sampled_from((5, 6, 131071, 131072, 199_999, 200_000)), st.integers(5, 200_000)),
         "n": st.integers(0, 255),
         "k": st.integers(-5, 5),
         "s": st.booleans(),
@@ -97,11 +99,12 @@ def holds_so(condition: str, given_points: list[dict[str, Value]]) -> bool:
         return False
     program, test = made
     frames = [declared(program.variables, [test.condition])[0], declared(program.variables)[0]]
-    for name in ("w", "v"):  # whatever is done with them
+    for name in ("w", "v", "u"):  # whatever is done with them
         frames[1].leaves[name] = smt.word(name, WIDTHS[name])
     kinds = {str(each.name): each.type for each in program.variables}
     start = {name: values.variable(name, kind) for name, kind in kinds.items()}
-    start["w"].term = smt.word("w", WIDTHS["w"])
+    for name in ("w", "u"):
+        start[name].term = smt.word(name, WIDTHS[name])
     node = Run({}, kinds, dict(start)).evaluate(test.condition)
     tried = trial.ready(test.condition)
     ways = [
@@ -138,7 +141,7 @@ def test_z3_says_what_the_interpreter_says(condition: str, given_points: list[di
 
 
 EDGES: list[dict[str, Value]] = [
-    {"w": w, "v": v, "n": n, "k": k, "s": s}
+    {"w": w, "v": v, "u": 5 + w % 199_996, "n": n, "k": k, "s": s}
     for w, v, n, k, s in (
         (0, 0, 0, 0, False), (0, 1, 1, -1, True), (131071, 131071, 255, -5, True), (131072, 131071, 7, 5, False),
         (131070, 131071, 8, -5, False), (2**64 - 1, 0, 128, 1, True), (2**63, 65536, 127, -2, False), (5, 5, 5, 5, True),
@@ -155,6 +158,7 @@ EDGES: list[dict[str, Value]] = [
         "abs(v) = v", "min(v, k) < 0", "max(v, k) = v",
         "max(v, 131072) = 131072", "min(w, v) = w", "max(w, 131072) > 131072", "min(v, 200000) = v",
         "v < max(k, 131072)", "v /= max(k, 131072)", "w[63] and not w[0]", "w[16..0] = v", "w[16..0] < v", "v[16..9] = n", "v[7..0] >= n",
+        "u < v", "u[17]", "u[16..0] = v", "u >= 200000", "u <= 5", "u / 131072 = 1", "w[17..0] = u", "u = w", "min(u, v) = v",
         "w / 65536 = 1", "w mod 3 = 1", "w / 131072 mod 2 = 1", "v / 131072 = 0", "v mod 1 = 0", "v mod 131072 = v", "w / 1 = w",
         "real(w) > 131071.0", "single(v) = single(k)", "real(v) * 2.0 > 4.0",
     ],
@@ -168,6 +172,7 @@ def test_each_kind_of_term_meets_each_other(condition: str) -> None:
     [
         ("w = 0b" + "x" * 63 + "1", {"w"}),
         ("w[16..0] = v and v < 7", {"w", "v"}),
+        ("u[17] and u > 7", {"u"}),  # whose least and greatest value leave out some
         ("w[7..0] = n", set()),  # a narrow word is a number
         ("w[7..0] < v[7..0] and v + 1 > 3", set()),  # what is compared with a number is one
         ("w[63] and v + 1 > 3", {"w"}),

@@ -167,6 +167,21 @@ BOXED = st.fixed_dictionaries(
 )
 
 
+def test_of_a_gap_that_nobody_reads_one_region_is_looked_for() -> None:
+    """Whether a repair mends is a question of whether there is one; its count is exact all the same."""
+    program = program_of(
+        HEAD + table_text("t", "line | n | c ||", "a | 0 | red ||", "b | 2 | blue ||", "c | -1 | /= green ||")
+    )
+    told, bare = (
+        prove_table(program, program.tables[0], Options(bare=bare, solver="boxes")).findings
+        for bare in (False, True)
+    )
+    [every], [one] = ([each for each in found if isinstance(each, Gap)] for found in (told, bare))
+    assert len(every.witnesses) > 2
+    assert one.witnesses == every.witnesses[:1]
+    assert one.count == every.count
+
+
 @given(st.lists(BOXED, max_size=6), st.lists(BOXED, max_size=3))
 def test_holes_are_all_that_no_box_fills_each_place_in_one(
     lines: list[dict[str, Box]], regions: list[dict[str, Box]]

@@ -106,14 +106,14 @@ WIDE = 16
 
 
 def bits_alone(conditions: Iterable[Expr], kinds: Mapping[str, Scalar]) -> dict[str, int]:
-    """Return the wide words, with all bits free, that the conditions read by fields, masks and comparisons alone, and their widths.
+    """Return the wide words that the conditions read by fields, masks and comparisons alone, and their widths.
 
     Empty where no condition reads bits of any: integers serve as well then.
     """
     wide = {
         name: kind.high.bit_length()
         for name, kind in kinds.items()
-        if isinstance(kind, Int) and _all_free(kind)
+        if isinstance(kind, Int) and kind.low >= 0 and kind.high.bit_length() > WIDE
     }
     uses, read = _Uses(), set[str]()
     for condition in conditions if wide else ():
@@ -129,10 +129,6 @@ def bits_alone(conditions: Iterable[Expr], kinds: Mapping[str, Scalar]) -> dict[
         other |= met
     read -= other
     return {name: bits for name, bits in wide.items() if name in read}
-
-
-def _all_free(kind: Int) -> bool:
-    return kind.low == 0 and kind.high.bit_length() > WIDE and not kind.high & (kind.high + 1)
 
 
 @dataclass(slots=True)

@@ -42,6 +42,27 @@ def possible(solver: Solver, *nodes: Node) -> bool:
     return told is Answer.SATISFIABLE
 
 
+def apart(nodes: Collection[Node], known: Collection[Node]) -> list[list[Node]]:
+    """Divide nodes into groups that no variable links, not even by what is known: these hold together just if each group does alone.
+
+    So a question about a state and conditions that do not look at it is one about each, which many other questions share. One
+    group or more, even of no node.
+    """
+    groups: list[tuple[frozenset[str], list[Node]]] = []
+    asked = dict.fromkeys(nodes)
+    for node in [*asked, *known]:
+        names = frozenset(values.variables([node]))
+        linked = [group for group in groups if not names.isdisjoint(group[0])]
+        groups = [group for group in groups if names.isdisjoint(group[0])]
+        groups.append(
+            (
+                names.union(*(group[0] for group in linked)),
+                [*([node] if node in asked else []), *(each for group in linked for each in group[1])],
+            )
+        )
+    return [group for _, group in groups if group] or [[]]
+
+
 def needed(tests: Mapping[int, Node], can_be: Callable[..., bool]) -> tuple[int, ...]:
     """Return the columns of a line whose tests neither its others nor what is known imply.
 

@@ -28,7 +28,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.proof.relation.effect import Effect, Meaning, Shared, value_after
-from rcsc.proof.relation.questions import needed, possible
+from rcsc.proof.relation.questions import apart, needed, possible
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Solver, UndecidedError
 from rcsc.proof.symbolic import values
@@ -93,13 +93,15 @@ class Steps:
         self.table, self.state = program.table(table.name), state
         self._next = str(state.name if state.deferred_until is None else pending(state.name))
         self._shared = Shared(program.kinds)
+        self._shared.know_words(program)
         self._before = self._shared.start[self._next] = self._shared.start[str(state.name)]
         self._meaning = Meaning(program, self._shared)
         self._solver = Solver(options.limits)
         self._asserted: set[str] = set()
-        known = self._meaning.assumed(self.table)
-        self._declare(known)
-        self._solver.add(*map(values.term_of, known))
+        self._known = self._meaning.assumed(self.table)
+        self._can_be: dict[tuple[Node, ...], bool] = {}
+        self._declare(self._known)
+        self._solver.add(*map(values.term_of, self._known))
         self._lines = self._meaning.every_line(self.table)
 
     def states(self) -> list[Value]:
@@ -173,5 +175,12 @@ class Steps:
         self._solver.add(*values.domain(new))
 
     def _possible(self, *nodes: Node) -> bool:
-        self._declare(nodes)
-        return possible(self._solver, *nodes)
+        """Whether nodes can hold together; what was asked of some of them, for another state or column, is not asked again."""
+        alike = [self._shared.canonical(node) for node in nodes]
+        return all(self._alone(tuple(group)) for group in apart(alike, self._known))
+
+    def _alone(self, group: tuple[Node, ...]) -> bool:
+        if group not in self._can_be:
+            self._declare(group)
+            self._can_be[group] = possible(self._solver, *group)
+        return self._can_be[group]

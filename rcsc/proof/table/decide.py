@@ -33,7 +33,7 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
     used: tuple[AssumptionName, ...] = ()
     certificate: Mapping[str, object] | None = None
     words = words_of(program, table)
-    settled = None if words is None else _by_boxes(program, table, words)
+    settled = None if words is None else _by_boxes(program, table, words, options)
     if settled is not None and (not table.assumptions or not _wrong(table, settled)):
         method, findings = "boxes", settled
         if not _wrong(table, findings):
@@ -64,13 +64,14 @@ def _certificate(program: Program, table: Table, options: Options) -> "Mapping[s
     return certificate_alone(program, table, options)
 
 
-def _by_boxes(program: Program, table: Table, words: Words) -> tuple[TableFinding, ...]:
+def _by_boxes(program: Program, table: Table, words: Words, options: Options) -> tuple[TableFinding, ...]:
     decided = boxes.TableBoxes.of(program, table, words)
     pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
     findings: list[TableFinding] = [DeadLine(at) for at in decided.dead()]
     findings.extend(decided.both(first, second) for first, second in pairs)
+    most = boxes.MOST_GAPS if must_cover(table) else boxes.MOST_FALLS
     try:
-        gap = decided.gap(not pairs, boxes.MOST_GAPS if must_cover(table) else boxes.MOST_FALLS)
+        gap = decided.gap(not pairs, 1 if options.bare else most)
     except partition.BudgetError:
         return (*findings, Undecided("whether every input is matched by some line; first mend the overlaps"))
     if gap is not None:

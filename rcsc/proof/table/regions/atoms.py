@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import joined, meet, scaled
@@ -284,10 +285,13 @@ def some(parts: Iterable[Formula]) -> Formula:
         if part == TRUE:
             return TRUE
         kept.update(dict.fromkeys(part.parts if isinstance(part, Some) else (part,)))
-    atoms = [part for part in kept if isinstance(part, Atom)]
+    boxes: dict[int, list[Box]] = {}
+    for part in kept:
+        if isinstance(part, Atom):
+            boxes.setdefault(part.form, []).append(part.box)
     formulas: list[Formula] = [
-        Atom(form, joined(interval for atom in atoms if atom.form == form for interval in atom.box))
-        for form in sorted({atom.form for atom in atoms})
+        Atom(form, of_form[0] if len(of_form) == 1 else joined(chain.from_iterable(of_form)))
+        for form, of_form in sorted(boxes.items())
     ]
     formulas += [part for part in kept if not isinstance(part, Atom)]
     return formulas[0] if len(formulas) == 1 else Some(tuple(formulas))

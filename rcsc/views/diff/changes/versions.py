@@ -3,18 +3,15 @@
 In: an `Aligned`. Out: answers that tables, procedures, levels and conditions are compared with.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.lang.digest import Digests
-from rcsc.lang.expressions.words import bits_alone
 from rcsc.lang.interpret import initial
-from rcsc.lang.leaves import every_statement, expressions
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
     Enum,
-    Expr,
     Int,
     Level,
     Op,
@@ -50,16 +47,6 @@ COVER_STEPS = 1_000_000
 
 Runner = Callable[[Program, dict[str, Scalars]], None]
 """Runs a version's part on a snapshot, in place."""
-
-
-def _expressions(program: Program) -> Iterator[Expr]:
-    """Yield the expressions that a version tests and calculates."""
-    for stated in (program.assumptions, program.invariants, program.properties):
-        yield from (each.condition for each in stated)
-    for table in program.tables:
-        yield from (test.condition for test in table.distinct_tests)
-    for statement in every_statement(program):
-        yield from expressions(statement)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +93,7 @@ class Versions:
             str(earlier(name)): kind for name, kind in self.kinds.items()
         }  # what a property calls them
         self.shared = Shared({**self.kinds, **befores})
-        words = bits_alone((*_expressions(aligned.before), *_expressions(aligned.after)), self.kinds)
-        for name, word in words.items():
-            self.shared.start[name].term = smt.word(name, word)
+        self.shared.know_words(aligned.before, aligned.after)
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.tally = Tally()
         self.spare = smt.Budget(COVER_STEPS)
