@@ -278,6 +278,12 @@ def _drawn(rng: Rng, small: bool) -> str:
     lines = (2, 3, 4, 5) if small else (2, 2, 3, 3, 3, 4, 4, 5, 6, 8, 14, 30)
     most = MOST_LINES_OF_MASKS if draw.masks else max(lines)
     tables = [_table("t", draw, named, rng, min(most, rng.choice(lines)))]
+    # Not from `rng`, as above.
+    own = random.Random(f"{tables}")
+    if own.randrange(2):
+        greatest = own.choice((1, 2, 5, 40))
+        draw.declared.append(f"state z : int 0 .. {greatest}")
+        tables[0] = _with_state(tables[0], greatest, own)
     if not rng.randrange(8):
         tables.append(_table("u", draw, named, rng, min(most, rng.choice(lines))))
     shown = [
@@ -303,6 +309,20 @@ def _table(name: str, draw: Draw, assumed: Sequence[str], rng: Rng, many: int) -
         rows.append(f"  | rest | {default} |{blank}{'|' if blank else ''}| | 1 |")
     rests = f" assuming {', '.join(assumed)}" if assumed and rng.randrange(3) else ""
     return "\n".join([f"table {name}{rests} {{", *rows, "}"])
+
+
+def _with_state(table: str, greatest: int, rng: Rng) -> str:
+    """Give a table a state: a column of conditions, and one of actions."""
+    cells = ("", "0", "1", "/= 1", "<= 1", str(greatest), "in {0, 1}", f"not in {{{greatest}}}")
+    nexts = ("", "z", "0", "1", str(greatest), "1 - min(z, 1)", f"min(z + 1, {greatest})")
+    head, heads, *rows, end = table.split("\n")
+    before, after = heads.split("||")
+    changed = [f"{before}| z ||{after} z |"]
+    for row in rows:
+        before, after = row.split("||") if "||" in row else (row.removesuffix("| | 1 |"), " | 1 |")
+        default = "DEFAULT" in row
+        changed.append(f"{before}| {'' if default else rng.choice(cells)} ||{after} {rng.choice(nexts)} |")
+    return "\n".join([head, *changed, end])
 
 
 def _order(before: Sequence[str], after: Sequence[str], rng: Rng) -> str:

@@ -10,6 +10,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic
@@ -20,7 +22,9 @@ from rcsc.front.commands.shared.graphs import WrongError, found_tables
 from rcsc.lang.interpret import cycle, holds, initial, run_table
 from rcsc.lang.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
 from rcsc.lang.project import load
+from rcsc.proof.relation.effect import Meaning, Shared
 from rcsc.proof.relation.follow import following
+from rcsc.proof.relation.questions import Independent
 from rcsc.proof.relation.same import Differs, Same, compare
 from rcsc.proof.relation.steps import Steps
 from rcsc.proof.solvers import smt
@@ -398,12 +402,12 @@ def test_lines_follow_each_other_as_the_interpreter_runs_them(tmp_path: Path) ->
         if now["at"] != now["at.next"] or not admitted(program, table, now):
             continue
         first = cycle(program, level, now)
-        for given in inputs(
+        for taken in inputs(
             program, {str(v.name): first.snapshot[v.name] for v in program.variables if v.kind != "input"}
         ):
-            settled = dict(given, at=given["at.next"]) if given["echo"] else given
+            settled = dict(taken, at=taken["at.next"]) if taken["echo"] else taken
             if admitted(program, table, settled):
-                expected.add((first.line_index, cycle(program, level, given).line_index))
+                expected.add((first.line_index, cycle(program, level, taken).line_index))
     assert {(pair.line, pair.then) for pair in following(program, table, OPTIONS)} == expected
     assert len(expected) > 12
 
@@ -416,6 +420,38 @@ def test_what_an_edge_need_not_show_follows_from_the_state(tmp_path: Path) -> No
     edges = {edge.line: edge for edge in graph_of(entry, "at").graph.edges}
     assert (edges["5"].guard, edges["5"].shown) == ("seen > 0", "")  # the assumption says it
     assert edges["3"].shown == "seen = 3"
+
+
+DIVIDED = (
+    "a", "not a", "b", "a or c", "b implies d", "not c", "d xor a", "n > 2", "n + m = 4", "m < n", "n /= 3", "a and n > 1", "m mod 2 = 1",
+    "c and m > 2 and b", "n < 3 or m > 1",
+)  # fmt: skip
+DIVIDED_TEXT = (
+    "".join(f"input {name} : bool\n" for name in "abcd")
+    + "input n : int 0 .. 3\ninput m : int 0 .. 3\noutput o : int 0 .. 1\ntable t {\n| line | when || o |\n"
+    + "".join(f"| l{at} | {condition} || 0 |\n" for at, condition in enumerate(DIVIDED))
+    + "}\n"
+)
+
+
+@given(
+    st.lists(st.sampled_from(range(len(DIVIDED))), max_size=3),
+    st.lists(st.sampled_from(range(len(DIVIDED))), max_size=4),
+)
+def test_conditions_hold_together_just_if_those_of_each_part_do(known: list[int], asked: list[int]) -> None:
+    program = program_of(DIVIDED_TEXT)
+    meaning = Meaning(program, Shared(program.kinds))
+    nodes = meaning.lines(program.tables[0])
+    tests = [test for line in program.tables[0].lines for test in line.tests if test is not None]
+    here = [now for now in inputs(program, {"o": 0}) if all(holds(tests[at], now) for at in (*known, *asked))]
+    questions = Independent([nodes[at] for at in known], OPTIONS)
+    chosen = [nodes[at] for at in asked]
+    for _ in range(2):  # the second time from what is kept
+        assert questions.possible(*chosen) == bool(here)
+        n, m = meaning.shared.start["n"], meaning.shared.start["m"]
+        found = list(questions.pairs(chosen, n, m))
+        assert len(found) == len(set(found))
+        assert set(found) == {(now["n"], now["m"]) for now in here}
 
 
 def test_masks_of_many_bits_come_to_a_graph(tmp_path: Path) -> None:

@@ -346,6 +346,17 @@ def test_many_errors_are_reported_in_one_run_in_order_of_position() -> None:
     assert [line for line, _, _ in reported(text)] == [1, 2, 3, 6]
 
 
+def test_of_several_variables_that_two_tables_write_the_first_by_name_is_told() -> None:
+    """Not any one of them: the order of names in a set differs from process to process."""
+    names = "gcfbhdae"
+    declared = "".join(f"output {name} : int 0 .. 9\n" for name in names)
+    heads, ones, twos = (" | ".join(each) for each in (names, "1" * 8, "2" * 8))
+    rows = f"| line | i || {heads} |\n| x | true || {ones} |\n| y | false || {twos} |\n"
+    tables = f"table t {{\n{rows}}}\ntable u {{\n{rows}}}\n"
+    [error] = refused(f"input i : bool\n{declared}{tables}level l {{ period 100 [ms] table t table u }}\n")
+    assert "both write `a`" in error.message
+
+
 def test_an_error_in_a_constant_is_not_reported_again_where_it_is_used() -> None:
     assert [code for _, code, _ in reported("const a = 1 / 0\nconst b = a + 1\nstate n : int 0 .. b")] == [
         "RCS305"

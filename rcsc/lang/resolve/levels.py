@@ -289,8 +289,8 @@ def _touched(choice: TableChoice, known: Declarations) -> _Touched:
         read, write = touched(actions, known.procedures)
         told = [known.assumptions[own].condition for own in table.assumptions if own in known.assumptions]
         every = {*table.variables, *read, *(leaf for condition in told for leaf in read_by(condition))}
-        reads |= {str(leaf): str(name) for leaf in every if leaf not in reads}
-        writes |= {str(leaf): str(name) for leaf in write if leaf not in writes}
+        reads |= {str(leaf): str(name) for leaf in sorted(every) if leaf not in reads}
+        writes |= {str(leaf): str(name) for leaf in sorted(write) if leaf not in writes}
     return _Touched(reads, writes)
 
 

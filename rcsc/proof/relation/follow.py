@@ -30,6 +30,7 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.lang.operator_table import CALCULATIONS
+from rcsc.proof.relation.effect import words_of
 from rcsc.proof.relation.questions import needed, possible, stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
@@ -113,15 +114,15 @@ class _Cycles:
         self, program: Program, table: Table, level: tuple[Level, Value | None] | None, options: Options
     ) -> None:
         self.program, self.table, self.level = program, table, level
-        self.start: dict[str, Node] = {}
+        self.words = words_of(program.kinds, program)
+        self.start = {name: self._variable(name, name) for name in self.words}
         self.options = options
-        self.cycle = 0
         self.loose = count(1)
 
     def pairs(self) -> Iterator[Follow]:
         """Yield every pair that is possible."""
         first = Run.of(self.program, self.start)
-        self._before_table(first)
+        self._before_table(first, 1)
         for variable in self.program.variables:
             if variable.deferred_until is not None:
                 first.state.leaves[pending(variable.name)] = first.leaf(variable.name)
@@ -133,7 +134,7 @@ class _Cycles:
             run.execute(action.statement for action in line.actions)
             self._others(run, after=True)
             self._procedures(run, () if self.level is None else self.level[0].postprocess)
-            self._before_table(run)
+            self._before_table(run, 2)
             known = [*facts, lines[at], *self._facts(run)]
             tests = self._tests(run)
             nexts = self._lines(tests)
@@ -145,14 +146,18 @@ class _Cycles:
                     can_be = partial(possible, solver)
                     yield Follow(at, to, needed(tests[to], can_be) if to < len(tests) else ())
 
-    def _before_table(self, run: Run) -> None:
+    def _variable(self, name: str, new: str) -> Node:
+        """Return any value of a leaf, under a new name; of a word that is looked at by bits alone, its bits."""
+        node = values.variable(new, self.program.kinds[name])
+        if name in self.words:
+            node.term = smt.word(new, self.words[name])
+        return node
+
+    def _before_table(self, run: Run, number: int) -> None:
         """Give the inputs any values, take the deferred values that are due, and run the preprocess."""
-        self.cycle += 1
         for variable in self.program.variables:
             if variable.kind is Kind.INPUT:
-                run.state.leaves[variable.name] = values.variable(
-                    f"{variable.name}'{self.cycle}", variable.type
-                )
+                run.state.leaves[variable.name] = self._variable(variable.name, f"{variable.name}'{number}")
         run.settle(self.program)
         self._procedures(run, () if self.level is None else self.level[0].preprocess)
         self._others(run, after=False)

@@ -3,8 +3,9 @@
 In: conditions as values. Out: whether they can hold together, or `UndecidedError`.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
+from rcsc.lang.model import Value
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver, UndecidedError
 from rcsc.proof.symbolic import values
@@ -19,7 +20,7 @@ def stated(nodes: Collection[Node], options: Options, spoken_of: Collection[Node
 
 
 def answer(solver: Solver, *nodes: Node) -> Answer:
-    """Return whether the nodes can hold together, and with what the solver knows."""
+    """Return whether the nodes can hold together, and with what the solver knows, ranges of their variables too."""
     if any(node is FALSE for node in nodes):
         return Answer.UNSATISFIABLE
     solver.push()
@@ -42,25 +43,95 @@ def possible(solver: Solver, *nodes: Node) -> bool:
     return told is Answer.SATISFIABLE
 
 
-def apart(nodes: Collection[Node], known: Collection[Node]) -> list[list[Node]]:
-    """Divide nodes into groups that no variable links, not even by what is known: these hold together just if each group does alone.
+class Independent:
+    """Questions about what can hold together with what is known, divided where no variable links their conditions.
 
-    So a question about a state and conditions that do not look at it is one about each, which many other questions share. One
-    group or more, even of no node.
+    These hold together just if those of each part do. So a question about a state and conditions that do not look at it is one about
+    each, which many other questions share, and none is asked with what it does not depend on.
+
+    Args:
+        known: What holds.
+        options: Limits of a question.
     """
-    groups: list[tuple[frozenset[str], list[Node]]] = []
-    asked = dict.fromkeys(nodes)
-    for node in [*asked, *known]:
-        names = frozenset(values.variables([node]))
-        linked = [group for group in groups if not names.isdisjoint(group[0])]
-        groups = [group for group in groups if names.isdisjoint(group[0])]
-        groups.append(
-            (
-                names.union(*(group[0] for group in linked)),
-                [*([node] if node in asked else []), *(each for group in linked for each in group[1])],
-            )
-        )
-    return [group for _, group in groups if group] or [[]]
+
+    def __init__(self, known: Collection[Node], options: Options) -> None:
+        self._known = dict.fromkeys(each for condition in known for each in values.conjuncts(condition))
+        self._options = options
+        self._variables: dict[Node, dict[str, Node]] = {}
+        self._answers: dict[tuple[Node, ...], bool] = {}
+        self._solvers: dict[tuple[Node, ...], Solver] = {}
+
+    def possible(self, *nodes: Node) -> bool:
+        """Return whether the nodes can hold together.
+
+        Raises:
+            UndecidedError: Z3 gave no answer.
+        """
+        return all(self._alone(tuple(part)) for part in self._parts(nodes))
+
+    def pairs(self, nodes: Iterable[Node], one: Node, other: Node) -> Iterator[tuple[Value, Value]]:
+        """Yield each pair that two values can be together where the nodes hold.
+
+        Raises:
+            UndecidedError: Z3 gave no answer.
+        """
+        ends = {*self._named(one), *self._named(other)}
+        linked, lone = list[Node](), list[list[Node]]()
+        for part in self._parts(nodes):
+            met = not ends.isdisjoint(name for node in part for name in self._named(node))
+            linked += part if met else []
+            lone += [] if met else [part]
+        if not all(self._alone(tuple(part)) for part in lone):
+            return
+        solver = stated(linked, self._options, (one, other))
+        while solver.possible():
+            found = [solver.value(values.term_of(node), node.kind) for node in (one, other)]
+            yield found[0], found[1]
+            solver.add(values.term_of(values.negation(pair_is((one, other), found))))
+
+    def _alone(self, part: tuple[Node, ...]) -> bool:
+        if part not in self._answers:
+            self._answers[part] = FALSE not in part and self._asked(part)
+        return self._answers[part]
+
+    def _asked(self, part: tuple[Node, ...]) -> bool:
+        """Ask about a part in the solver that knows what is known of it."""
+        known = tuple(node for node in part if node in self._known)
+        if known not in self._solvers:
+            self._solvers[known] = stated(known, self._options)
+        solver = self._solvers[known]
+        asked = [node for node in part if node not in self._known]
+        solver.push()
+        try:
+            solver.add(*values.domain(values.variables(asked).values()), *map(values.term_of, asked))
+            return solver.possible()
+        finally:
+            solver.pop()
+
+    def _parts(self, nodes: Iterable[Node]) -> list[list[Node]]:
+        """Divide nodes, and what is known, into parts that no variable links."""
+        asked = dict.fromkeys(each for condition in nodes for each in values.conjuncts(condition))
+        parts: list[tuple[set[str], list[Node]]] = []
+        for node in {**self._known, **asked}:
+            names, part = set(self._named(node)), [node]
+            for other in [each for each in parts if not names.isdisjoint(each[0])]:
+                parts.remove(other)
+                names |= other[0]
+                part = other[1] + part
+            parts.append((names, part))
+        return [part for _, part in parts]
+
+    def _named(self, node: Node) -> dict[str, Node]:
+        if node not in self._variables:
+            self._variables[node] = values.variables([node])
+        return self._variables[node]
+
+
+def pair_is(nodes: Sequence[Node], ends: Sequence[Value]) -> Node:
+    """Return the condition that nodes have these values."""
+    return values.all_of(
+        values.equal(node, values.constant(node.kind, end)) for node, end in zip(nodes, ends, strict=True)
+    )
 
 
 def needed(tests: Mapping[int, Node], can_be: Callable[..., bool]) -> tuple[int, ...]:

@@ -124,6 +124,7 @@ class _Question:
         program = relying(one)
         self.variables = program.variables
         self.shared = Shared({**other.kinds, **program.kinds})
+        self.shared.know_words(other, program)
         own = hidden(one) ^ hidden(other)
         self.compared = [name for name in self.shared.kinds if name not in own]
         self.effects: dict[Outcome, Effect] = {}

@@ -28,9 +28,9 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.proof.relation.effect import Effect, Meaning, Shared, value_after
-from rcsc.proof.relation.questions import apart, needed, possible
+from rcsc.proof.relation.questions import Independent, needed, pair_is
 from rcsc.proof.solvers.options import Options
-from rcsc.proof.solvers.smt import Solver, UndecidedError
+from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.evaluation import TooLongError
 from rcsc.proof.symbolic.values import Node
@@ -62,25 +62,6 @@ class Step:
     decided: bool = False
 
 
-def reached(solver: Solver, before: Node, after: Node) -> Iterator[tuple[Value, Value]]:
-    """Yield each pair that two values can be together, by what the solver knows; that they are another pair is asserted.
-
-    Raises:
-        UndecidedError: Z3 gave no answer.
-    """
-    while solver.possible():
-        ends = [solver.value(values.term_of(node), node.kind) for node in (before, after)]
-        yield ends[0], ends[1]
-        solver.add(values.term_of(values.negation(pair_is((before, after), ends))))
-
-
-def pair_is(nodes: Sequence[Node], ends: Sequence[Value]) -> Node:
-    """Return the condition that nodes have these values."""
-    return values.all_of(
-        values.equal(node, values.constant(node.kind, end)) for node, end in zip(nodes, ends, strict=True)
-    )
-
-
 class Steps:
     """One table's steps.
 
@@ -96,12 +77,7 @@ class Steps:
         self._shared.know_words(program)
         self._before = self._shared.start[self._next] = self._shared.start[str(state.name)]
         self._meaning = Meaning(program, self._shared)
-        self._solver = Solver(options.limits)
-        self._asserted: set[str] = set()
-        self._known = self._meaning.assumed(self.table)
-        self._can_be: dict[tuple[Node, ...], bool] = {}
-        self._declare(self._known)
-        self._solver.add(*map(values.term_of, self._known))
+        self._asked = Independent(self._meaning.assumed(self.table), options)
         self._lines = self._meaning.every_line(self.table)
 
     def states(self) -> list[Value]:
@@ -126,11 +102,7 @@ class Steps:
             after.append((effect.wrote[self.state.name], effect.leaves[self.state.name]))
         pairs = set[tuple[Value, Value]]()
         for when, node in after:
-            self._declare([line, when, node, self._before])
-            self._solver.push()
-            self._solver.add(values.term_of(line), values.term_of(when))
-            pairs.update(reached(self._solver, self._before, node))
-            self._solver.pop()
+            pairs.update(self._asked.pairs((line, when), self._before, node))
         return pairs
 
     def sets(self, action: Action) -> Value | None:
@@ -168,19 +140,5 @@ class Steps:
         except (TooLongError, RecursionError) as error:
             raise UndecidedError from error
 
-    def _declare(self, nodes: Sequence[Node]) -> None:
-        """Asserts the ranges of variables not met before."""
-        new = [node for name, node in values.variables(nodes).items() if name not in self._asserted]
-        self._asserted.update(node.name for node in new)
-        self._solver.add(*values.domain(new))
-
     def _possible(self, *nodes: Node) -> bool:
-        """Whether nodes can hold together; what was asked of some of them, for another state or column, is not asked again."""
-        alike = [self._shared.canonical(node) for node in nodes]
-        return all(self._alone(tuple(group)) for group in apart(alike, self._known))
-
-    def _alone(self, group: tuple[Node, ...]) -> bool:
-        if group not in self._can_be:
-            self._declare(group)
-            self._can_be[group] = possible(self._solver, *group)
-        return self._can_be[group]
+        return self._asked.possible(*map(self._shared.canonical, nodes))

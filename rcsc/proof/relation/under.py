@@ -35,7 +35,9 @@ def lines_under(program: Program, table: Table, condition: Expr, options: Option
     """Return the lines that can match where a condition holds."""
     program = relying(program)
     meant = program.table(table.name)
-    meaning = Meaning(program, Shared(program.kinds))
+    shared = Shared(program.kinds)
+    shared.know_words(program)
+    meaning = Meaning(program, shared)
     names = [str(line.name) for line in meant.every_line]
     try:
         lines, wanted = meaning.every_line(meant), meaning.condition(condition)

@@ -369,6 +369,17 @@ def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
             stack.extend((part, False) for part in node.args if part not in seen)
 
 
+def conjuncts(condition: Node) -> Iterator[Node]:
+    """Yield the conditions that this one joins by `and`."""
+    waiting = [condition]
+    while waiting:
+        node = waiting.pop()
+        if node.op == Op.AND:
+            waiting.extend(node.args)
+        else:
+            yield node
+
+
 @dataclass(slots=True)
 class Alike:
     """Numbers nodes; those built alike and with the same bounds get the same number.

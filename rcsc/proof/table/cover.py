@@ -164,7 +164,7 @@ class Space:
         """Return the box that conditions on single variables allow, and the other conditions."""
         rest: list[Node] = []
         hull: dict[str, Box] = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
-        for part in _conjuncts(allowed):
+        for part in values.conjuncts(allowed):
             variables = values.variables([part])
             if len(variables) != 1 or any(node.op not in _PLAIN for node in values.parts_first(part)):
                 rest.append(part)
@@ -280,17 +280,6 @@ def _stretched(at: int, ends: tuple[int, int], fits: Callable[[Box], bool]) -> t
 
 _PLAIN = {*COMPARISONS, Op.NOT, Op.AND, CONSTANT, VARIABLE, NARROWED}
 """Operators of conditions that have one value all over a class."""
-
-
-def _conjuncts(condition: Node) -> Iterator[Node]:
-    """Yield the conditions that this one joins by `and`."""
-    waiting = [condition]
-    while waiting:
-        node = waiting.pop()
-        if node.op == Op.AND:
-            waiting.extend(node.args)
-        else:
-            yield node
 
 
 def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:

@@ -25,8 +25,8 @@ from rcsc.lang.model import (
     pending,
 )
 from rcsc.proof.relation.follow import following
-from rcsc.proof.relation.questions import stated
-from rcsc.proof.relation.steps import is_few, pair_is, reached
+from rcsc.proof.relation.questions import Independent, pair_is
+from rcsc.proof.relation.steps import is_few
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.proof.symbolic import values
@@ -116,7 +116,7 @@ def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[
             wrote = versions.shared.canonical(wrote)
             if leaf in effect.leaves and not (wrote.known and not wrote.low):
                 nodes = versions.shared.start[state], effect.leaves[leaf]
-                for ends in sorted(reached(stated([wrote], versions.options, nodes), *nodes)):
+                for ends in sorted(Independent([wrote], versions.options).pairs((), *nodes)):
                     words = [number(versions.types[state], value) for value in ends]
                     taken = versions.shared.canonical(values.both(wrote, pair_is(nodes, ends)))
                     yield GraphStep(str(table.name), str(line.name), words[0], words[1]), taken
