@@ -75,7 +75,7 @@ def mended(
         smt.leave_open("whether a repair mends")
         return verdict.findings
     trials = _Trials(verdict, root, loaded, replace(options, brief=True, bare=True, jobs=1), known)
-    with smt.together(min(WRONG_STEPS, options.together), of_all=True):
+    with smt.together(min(2 * WRONG_STEPS, options.together), of_all=True):
         return tuple(_tried(finding, trials) for finding in verdict.findings)
 
 
