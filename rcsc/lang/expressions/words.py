@@ -58,8 +58,8 @@ def field_of(number: Expr) -> Field | None:
             if part is None or (op is Op.DIV and part.low + places > part.high):
                 return None
             if op is Op.DIV:
-                return replace(part, low=part.low + places)
-            return replace(part, high=min(part.high, part.low + places - 1))
+                return Field(part.word, part.high, part.low + places)
+            return Field(part.word, min(part.high, part.low + places - 1), part.low)
     return None
 
 

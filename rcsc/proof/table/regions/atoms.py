@@ -184,6 +184,8 @@ class Universe:
                 return every(map(self.of, conjuncts(condition)))
             case Apply(op=op) if is_logic(op) and _written_out(condition) > MOST_WRITTEN_OUT:
                 return self._truth(condition, wanted)
+            case Apply(op=Op.AND):  # all of a mask at once: it has a conjunct a bit
+                return some(self.of(part, False) for part in conjuncts(condition))
             case Apply(op=op, args=(left, right)) if is_logic(op):
                 return self._truths(op, left, right)(wanted)
             case Apply(op=op, args=(left, right)) if is_comparison(op):
