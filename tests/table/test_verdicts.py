@@ -18,7 +18,10 @@ from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, Value
+from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.table.confirm import TableSolver
 from rcsc.proof.table.program import prove_program
 from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 from tests.support.programs.stages import drawn_program, program_of, reported, verdict_of
@@ -327,3 +330,32 @@ level l {{ period 40 [ms] {level} }}
         assert Code.CONTRADICTORY_ASSUMPTIONS not in [each.code for each in reported(text(low, high, both))]
     alone = reported(text("n < 1 and n > 2", "n >= 7", both))
     assert len([each for each in alone if each.code is Code.CONTRADICTORY_ASSUMPTIONS]) == 1
+
+
+CALCULATES = """
+input a : real -100.0 .. 100.0
+input c : real 0.0 .. 1.0
+input n : int 0 .. 9
+table t {
+  | line | a * 1e308 - c * 1e308 | when ||
+  | x | <= 0.0 | single(n) * 2e38 - single(n) * 2e38 >= 0.0 ||
+  | y | in {0.5, -1.0} | a * 1e308 > 0.5 ||
+  | z | > 0.0 | not (single(n) * 2e38 - single(n) * 2e38 >= 0.0) ||
+}
+"""
+
+
+def test_what_is_calculated_of_doubles_is_stated_to_the_solver_once() -> None:
+    """Of each question Z3 makes bits of it anew; by a name it is what the interpreter says, NaN and infinities too."""
+    program = program_of(CALCULATES)
+    [tested] = program.tables
+    solver = TableSolver(program, tested, Options())
+    assert len(solver.frame.named) == 3
+    leaves = {str(v.name): (v, solver.frame.leaves[str(v.name)]) for v in program.variables}
+    for a, c, n in product((-100.0, -0.0, 1e-308), (0.0, 1.0), (0, 9)):
+        now: dict[str, Value] = {"a": a, "c": c, "n": n}
+        here = [smt.equal(term, smt.literal(v.type, now[name]), v.type) for name, (v, term) in leaves.items()]
+        matching = set(matching_lines(tested, now))
+        for at, line in enumerate(tested.lines):
+            told = solver.holds(*here, solver.line(at))
+            assert (told is Answer.SATISFIABLE) == (line.name in matching), (now, line.name)

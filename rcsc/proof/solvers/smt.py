@@ -636,7 +636,13 @@ class Solver:
 
     def _count(self) -> int:
         """Return the steps that Z3 has counted so far; 0 where no budget needs them."""
-        return int(self._solver.statistics().get_key_value("rlimit count")) if _own.budgets else 0
+        if _own.budgets:
+            counts = self._solver.statistics()
+            for at in range(len(counts) - 1, -1, -1):  # it is one of the last, and each takes several calls
+                name, value = counts[at]
+                if name == "rlimit count":
+                    return int(value)
+        return 0
 
     def _charge(self, before: int) -> None:
         """Charge a question's steps to all budgets; not those of an attempt that only the clock ended."""

@@ -47,10 +47,15 @@ from rcsc.proof.solvers.smt import Answer, Solver, Term
 
 @dataclass(slots=True)
 class Frame:
-    """The term of every leaf and local at one point of a run."""
+    """The term of every leaf and local at one point of a run.
+
+    Attributes:
+        named: Terms by which some expressions are known, besides their leaves.
+    """
 
     leaves: dict[str, Term]
     local: dict[str, Term] = field(default_factory=dict)
+    named: dict[Expr, Term] = field(default_factory=dict)
 
 
 def encode(expr: Expr, frame: Frame) -> Term:
@@ -82,6 +87,8 @@ def encode(expr: Expr, frame: Frame) -> Term:
                 return masked
             return operation(Op.AND, last.type, [encode(arg, frame) for arg in expr.args])
         case Apply(op=op, args=args):
+            if frame.named and isinstance(expr.type, Real) and expr in frame.named:
+                return frame.named[expr]
             return operation(op, args[0].type, [encode(arg, frame) for arg in args])
 
 

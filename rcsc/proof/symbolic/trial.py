@@ -44,8 +44,8 @@ MOST_NODES = 1_500
 """Larger questions go to Z3 at once."""
 EVALUATIONS = 100_000
 """Nodes of all points together at which `met` looks: about a tenth of a second."""
-_NODES_OF_A_STEP = 3
-"""Nodes at a point that cost a step of Z3."""
+_NODES_OF_A_STEP = 1
+"""Nodes at a point that cost a step of Z3: each takes a microsecond or two."""
 
 Point = dict[str, Value]
 

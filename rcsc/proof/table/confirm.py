@@ -3,12 +3,13 @@
 In: a table and what was found. Out: whether Z3 agrees.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
-from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Expr, Program, Snapshot, Table, Variable
+from rcsc.lang.leaves import operands, read_by
+from rcsc.lang.model import Apply, Expr, Program, Real, Snapshot, Table, Variable
+from rcsc.lang.operator_table import CALCULATIONS
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
 from rcsc.proof.solvers.smt import Answer, Solver, Term
@@ -24,6 +25,18 @@ def shown(program: Program, table: Table) -> list[Variable]:
     return [variable for variable in program.variables if variable.name in wanted]
 
 
+def calculated(conditions: Iterable[Expr]) -> Iterator[Expr]:
+    """Yield what conditions calculate of doubles and singles, each whole."""
+    for condition in conditions:
+        waiting = [condition]
+        while waiting:
+            expr = waiting.pop()
+            if isinstance(expr, Apply) and isinstance(expr.type, Real) and expr.op in CALCULATIONS:
+                yield expr
+            else:
+                waiting += operands(expr)
+
+
 class TableSolver:
     """One solver that knows the table's domain and assumptions, and each line as a literal."""
 
@@ -35,6 +48,9 @@ class TableSolver:
         self.frame, domain = declared(shown(program, table), [*tests, *assumed])
         self.solver = Solver(options.limits)
         self.solver.add(*domain, *(encode(condition, self.frame) for condition in assumed))
+        # Z3 makes bits of them for each question anew, a tenth of a second each, unless they stand for themselves.
+        for number in dict.fromkeys(calculated([*tests, *assumed])):
+            self.frame.named[number] = self.solver.named(encode(number, self.frame))
         self._lines: dict[int, Term] = {}
         self._tests: dict[int, Term] = {}
 
