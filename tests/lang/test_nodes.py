@@ -7,9 +7,25 @@ from types import SimpleNamespace
 
 import pytest
 import z3
+from hypothesis import given
+from hypothesis import strategies as st
 
-from rcsc.lang.model import Among, Bool, Enum, Int, Kind, Read, Real, Scalar, Variable, VariableName
+from rcsc.lang.model import (
+    Among,
+    Bool,
+    Enum,
+    Int,
+    Kind,
+    Read,
+    Real,
+    Scalar,
+    Single,
+    Variable,
+    VariableName,
+    part_way,
+)
 from rcsc.lang.operator_table import Op
+from rcsc.lang.operator_table import single as to_single
 from rcsc.proof.procedures.discharge import MOST_CHOICES, fewest
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Limits
@@ -226,6 +242,33 @@ def test_a_goal_is_met_only_where_all_conditions_hold() -> None:
     none = values.compare(Op.EQ, divided, whole(0))  # is not defined there, nor is its negation
     assert trial.met([values.compare(Op.EQ, N, whole(0))], [none, values.negation(none)], {}) == {}
     assert trial.met([values.compare(Op.EQ, N, whole(1))], [none, values.negation(none)], {}) != {}
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        Real(-1e308, 1e308),
+        Real(-1.7e308, 5e-324),
+        Real(0.1, 0.1),
+        Single(-to_single(3e38), to_single(3e38)),
+        Real(1.0, 1.0000000000000004),
+    ],
+)
+def test_no_input_is_tried_that_lies_outside_its_range(kind: Real) -> None:
+    """The difference of two ends may be beyond all doubles."""
+    tried = [point["x"] for point in trial.points([Variable(VariableName("x"), Kind.INPUT, kind, kind.low)])]
+    assert len(tried) > 100
+    assert all(kind.low <= float(value) <= kind.high for value in tried)
+
+
+@given(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.floats(0.0, 1.0),
+)
+def test_a_part_of_the_way_lies_between(one: float, other: float, part: float) -> None:
+    low, high = sorted((one, other))
+    assert low <= part_way(low, high, part) <= high
 
 
 def test_the_points_that_are_tried_are_always_the_same() -> None:

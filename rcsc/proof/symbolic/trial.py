@@ -31,6 +31,7 @@ from rcsc.lang.model import (
     Variable,
     key_bounds,
     key_of,
+    part_way,
     value_of_key,
 )
 from rcsc.lang.operator_table import single
@@ -215,7 +216,7 @@ def _pick(variable: Node, number: int, random: Random) -> Value:
     if kind == 0:
         return value_of_key(variable.kind, random.choice([*ends, *near]))
     if kind == 1 and isinstance(variable.kind, Real):
-        value = random.uniform(variable.kind.low, variable.kind.high) + 0.0
+        value = part_way(variable.kind.low, variable.kind.high, random.random()) + 0.0
         return single(value) if isinstance(variable.kind, Single) else value
     return value_of_key(variable.kind, random.randint(low, high))
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
+from rcsc.lang.model import part_way
 from rcsc.lang.restart import COMMAND
 from rcsc.run.episodes.episode import OrderSpec, Setting
 from rcsc.run.episodes.outcome import RowEnd
@@ -51,7 +52,9 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
     if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
         return random.choice(edges)
     return (
-        leaf.held(random.uniform(low, high)) if leaf.c_type in REALS else random.randint(int(low), int(high))
+        leaf.held(part_way(low, high, random.random()))
+        if leaf.c_type in REALS
+        else random.randint(int(low), int(high))
     )
 
 
