@@ -159,6 +159,22 @@ def test_a_way_that_grows_shorter_ends(seen: str, tmp_path: Path) -> None:
     assert 0.15 <= least <= 0.3  # the greatest power of two of the range
 
 
+def test_a_way_in_a_range_wider_than_any_double_ends(tmp_path: Path) -> None:
+    """`1e308 - -1e308` is infinity: of that `rcsc prove` took a part, and ended with a bug."""
+    wide = lower_level(
+        *WAY,
+        declared="state x : real -1e308 .. 1e308",
+        seen="on := x >= 1e308",
+        begin="x := -1e308",
+        work="x := min(1e308, x + 1e305)",
+    )
+    found = ending(tmp_path, wide)
+    assert found.proved
+    least = found.counted[0].least
+    assert least is not None
+    assert 0.5e305 <= least <= 1e305
+
+
 def test_a_way_on_which_a_step_may_be_lost_is_not_shown_to_end(tmp_path: Path) -> None:
     """Rounded, 1 and 1e-20 are 1; and with no speed there is no step."""
     for at, work in enumerate(("x := min(100.0, x + 0.00000000000000000001)", "x := min(100.0, x + 0.0)")):

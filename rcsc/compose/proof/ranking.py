@@ -7,6 +7,7 @@ reachability", 2005): once one that never goes back is found, only cycles that l
 weights of a sum are guessed from cycles that the solver shows, and then asked about.
 """
 
+import sys
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -436,7 +437,9 @@ class _Ranking:
     def _least_move(self, runs: list[Term], number: KeptNumber, *, falls: bool) -> float | None:
         """Return by how much the real changes at least; None if that is not shown."""
         assert isinstance(number.kind, Real)
-        width = number.kind.high - number.kind.low
+        width = min(
+            number.kind.high - number.kind.low, sys.float_info.max
+        )  # of two ends it may be beyond all doubles
         low, high = (number.after, number.before) if falls else (number.before, number.after)
 
         def moves(power: int) -> bool:
