@@ -47,10 +47,9 @@ Further assumptions:
   orders again cannot come near it (`WAITS`).
 - *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the order in its buffer,
   or after the echo if the buffer is empty, what it takes counts as seen, and its report echoes what it echoed, so that no echo goes back
-  even if its first cycles are refused; what is adopted otherwise is refuted (`NEXT_NUMBER`, `ECHOES`). What stands in its buffers is as
-  its neighbours owe it, or as it begins itself, which is owed, too. It is proved like the first. To
-  its neighbours it is an order that is superseded, or a report that failed. If the buffer is empty, freshness requires more: no earlier
-  order of the level that is not echoed yet may still be on its way, because its number is now used again.
+  even if its first cycles are refused; what is adopted otherwise is refuted (`NEXT_NUMBER`, `ECHOES`). Its buffers hold what neighbours
+  owe, or what it begins with, owed too. To its neighbours it is an order that is superseded, or a report that failed. If the buffer is
+  empty, freshness requires more: no earlier order of it that is not echoed yet may be on its way, because its number is used again.
 - *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may be anything.
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is shown in turn
   of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there had been none,
