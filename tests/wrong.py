@@ -319,7 +319,7 @@ def _with_state(table: str, greatest: int, rng: Rng) -> str:
     before, after = heads.split("||")
     changed = [f"{before}| z ||{after} z |"]
     for row in rows:
-        before, after = row.split("||") if "||" in row else (row.removesuffix("| | 1 |"), " | 1 |")
+        before, after = row.split("||")
         default = "DEFAULT" in row
         changed.append(f"{before}| {'' if default else rng.choice(cells)} ||{after} {rng.choice(nexts)} |")
     return "\n".join([head, *changed, end])

@@ -10,10 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
+from random import Random
 from typing import TypeAlias
 
 from rcsc.base.host.files.names import BadName, identifier, inside, shown
 from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, text
+from rcsc.lang.model import part_way
 from rcsc.lang.operator_table import single, spell_single
 from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, Stands, by_names
 from rcsc.run.description import BadDescription
@@ -100,6 +102,12 @@ class Leaf:
     def held(self, value: float) -> float:
         """Return a real number as the variable's C type holds it: a single is rounded."""
         return single(value) if self.c_type == "float" else value
+
+    def anywhere(self, random: Random, low: float, high: float) -> Value:
+        """Return a number between two, both of which it can be; it is no truth value."""
+        if self.c_type in REALS:
+            return self.held(part_way(low, high, random.random()))
+        return random.randint(int(low), int(high))
 
     def read(self, text: str) -> Value:
         """Read the value of a text.

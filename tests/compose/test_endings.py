@@ -144,10 +144,15 @@ def test_default_may_go_on_for_ever_like_any_line(tmp_path: Path) -> None:
     assert ending(tmp_path, lower_level(ends, "5 | DEFAULT | | | || | executing")).endless == ("5",)
 
 
-def way(work: str, seen: str = "on := x >= 100.0", inputs: str = "") -> str:
-    """Return a lower level that goes a way `x` from 0, until it is seen to be long enough."""
-    declared = f"{inputs}state x : real 0.0 .. 100.0"
-    return lower_level(*WAY, declared=declared, seen=seen, begin="x := 0.0", work=work)
+def way(
+    work: str,
+    seen: str = "on := x >= 100.0",
+    inputs: str = "",
+    within: tuple[str, str] = ("0.0", "100.0"),
+) -> str:
+    """Return a lower level that goes a way `x` from its least value, until it is seen to be long enough."""
+    declared = f"{inputs}state x : real {' .. '.join(within)}"
+    return lower_level(*WAY, declared=declared, seen=seen, begin=f"x := {within[0]}", work=work)
 
 
 @pytest.mark.parametrize("seen", ["on := x >= 100.0", "on := 100.0 - x <= 0.0", "on := x * 0.1 >= 9.99"])
@@ -161,13 +166,7 @@ def test_a_way_that_grows_shorter_ends(seen: str, tmp_path: Path) -> None:
 
 def test_a_way_in_a_range_wider_than_any_double_ends(tmp_path: Path) -> None:
     """`1e308 - -1e308` is infinity: of that `rcsc prove` took a part, and ended with a bug."""
-    wide = lower_level(
-        *WAY,
-        declared="state x : real -1e308 .. 1e308",
-        seen="on := x >= 1e308",
-        begin="x := -1e308",
-        work="x := min(1e308, x + 1e305)",
-    )
+    wide = way("x := min(1e308, x + 1e305)", "on := x >= 1e308", within=("-1e308", "1e308"))
     found = ending(tmp_path, wide)
     assert found.proved
     least = found.counted[0].least

@@ -77,6 +77,19 @@ def said(entry: FoundTable, text: str, form: str) -> Against:
     return against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS)
 
 
+def questions_from_now(monkeypatch: pytest.MonkeyPatch) -> list[Solver]:
+    """Return a list to which each question adds the solver that it is put to."""
+    asked: list[Solver] = []
+    check = Solver.check
+
+    def noted(solver: Solver, *terms: Term) -> Answer:
+        asked.append(solver)
+        return check(solver, *terms)
+
+    monkeypatch.setattr(Solver, "check", noted)
+    return asked
+
+
 def test_the_states_are_asked_for_once_however_many_edges_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,14 +98,7 @@ def test_the_states_are_asked_for_once_however_many_edges_there_are(
     rows = "".join(f"| n{at} | {at} | not in {{m{at}}} || m{at} |\n" for at in range(5))
     declared = f"enum e {{ {members} }}\ninput a : int 0 .. 5\nstate s : e\n"
     text = f"{declared}table t {{\n| line | a | s || s |\n{rows}| rest | DEFAULT | || s |\n}}\n"
-    asked: list[Solver] = []
-    check = Solver.check
-
-    def counted(solver: Solver, *terms: Term) -> Answer:
-        asked.append(solver)
-        return check(solver, *terms)
-
-    monkeypatch.setattr(Solver, "check", counted)
+    asked = questions_from_now(monkeypatch)
     drawn = graph_of(found_in(text, tmp_path), "s").graph
     assert len(drawn.edges) > 190
     assert len(asked) < 40 + 6 * 40 * 2 + 2 * len(drawn.edges)
@@ -106,17 +112,10 @@ def test_what_does_not_look_at_the_state_is_asked_for_once(
     declared = f"enum e {{ {members} }}\ninput a : int 0 .. 9\ninput b : int 0 .. 9\nstate s : e\n"
     rows = "| n0 | > 3 | > 4 | < 8 | not in {m0} || 1 |\n| n1 | > 3 | < 3 | > 1 | /= m3 || 2 |\n"
     text = f"{declared}output o : int 0 .. 2\ntable t {{\n| line | a | b | b | s || o |\n{rows}}}\n"
-    asked: list[Solver] = []
-    check = Solver.check
-
-    def counted(solver: Solver, *terms: Term) -> Answer:
-        asked.append(solver)
-        return check(solver, *terms)
-
     entry = found_in(text, tmp_path)
     steps = Steps(entry.program, entry.table, entry.program.variable("s"), OPTIONS)
     states = steps.states()
-    monkeypatch.setattr(Solver, "check", counted)
+    asked = questions_from_now(monkeypatch)
     needed = {steps.needed(line, state) for line in (0, 1) for state in states[4:]}
     assert needed == {(0, 1, 2)}
     assert len(asked) <= 36 * 4 + 8  # of a state its own cell alone, and each other cell once

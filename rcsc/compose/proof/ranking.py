@@ -437,9 +437,8 @@ class _Ranking:
     def _least_move(self, runs: list[Term], number: KeptNumber, *, falls: bool) -> float | None:
         """Return by how much the real changes at least; None if that is not shown."""
         assert isinstance(number.kind, Real)
-        width = min(
-            number.kind.high - number.kind.low, sys.float_info.max
-        )  # of two ends it may be beyond all doubles
+        # The difference of two ends may be beyond all doubles.
+        width = min(number.kind.high - number.kind.low, sys.float_info.max)
         low, high = (number.after, number.before) if falls else (number.before, number.after)
 
         def moves(power: int) -> bool:

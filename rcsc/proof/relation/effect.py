@@ -73,22 +73,22 @@ def words_of(kinds: Mapping[str, Scalar], *programs: Program) -> dict[str, int]:
 class Shared:
     """Hash-consed nodes, and the leaves that all runs begin with.
 
-    Attributes:
+    Args:
         kinds: The type of each of these leaves.
-        start: Each as a value.
+        programs: Those of which conditions are asked; words of which they look at bits alone are bits (`words_of`).
+
+    Attributes:
+        start: Each leaf as a value.
     """
 
-    def __init__(self, kinds: Mapping[str, Scalar]) -> None:
+    def __init__(self, kinds: Mapping[str, Scalar], *programs: Program) -> None:
         self.kinds = kinds
         self._known: dict[tuple[object, ...], Node] = {}
         self._of: dict[Node, Node] = {}
         self._bare: dict[tuple[object, ...], int] = {}
         self._number: dict[Node, int] = {}
         self.start = {name: self.canonical(values.variable(name, kind)) for name, kind in kinds.items()}
-
-    def know_words(self, *programs: Program) -> None:
-        """Know words by their bits where these programs look at bits alone (`words_of`)."""
-        for name, bits in words_of(self.kinds, *programs).items():
+        for name, bits in words_of(kinds, *programs).items():
             self.start[name].term = smt.word(name, bits)
 
     def canonical(self, node: Node) -> Node:

@@ -123,8 +123,7 @@ class _Question:
         other, one = matched(second[0], first[0])
         program = relying(one)
         self.variables = program.variables
-        self.shared = Shared({**other.kinds, **program.kinds})
-        self.shared.know_words(other, program)
+        self.shared = Shared({**other.kinds, **program.kinds}, other, program)
         own = hidden(one) ^ hidden(other)
         self.compared = [name for name in self.shared.kinds if name not in own]
         self.effects: dict[Outcome, Effect] = {}

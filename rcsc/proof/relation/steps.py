@@ -73,8 +73,7 @@ class Steps:
         program = relying(program)
         self.table, self.state = program.table(table.name), state
         self._next = str(state.name if state.deferred_until is None else pending(state.name))
-        self._shared = Shared(program.kinds)
-        self._shared.know_words(program)
+        self._shared = Shared(program.kinds, program)
         self._before = self._shared.start[self._next] = self._shared.start[str(state.name)]
         self._meaning = Meaning(program, self._shared)
         self._asked = Independent(self._meaning.assumed(self.table), options)

@@ -35,9 +35,7 @@ def lines_under(program: Program, table: Table, condition: Expr, options: Option
     """Return the lines that can match where a condition holds."""
     program = relying(program)
     meant = program.table(table.name)
-    shared = Shared(program.kinds)
-    shared.know_words(program)
-    meaning = Meaning(program, shared)
+    meaning = Meaning(program, Shared(program.kinds, program))
     names = [str(line.name) for line in meant.every_line]
     try:
         lines, wanted = meaning.every_line(meant), meaning.condition(condition)

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
-from rcsc.lang.model import part_way
 from rcsc.lang.restart import COMMAND
 from rcsc.run.episodes.episode import OrderSpec, Setting
 from rcsc.run.episodes.outcome import RowEnd
@@ -51,11 +50,7 @@ def between(random: Random, leaf: Leaf, edges: Sequence[Value]) -> Value:
     low, high = leaf.low, leaf.high
     if leaf.members or leaf.c_type == "bool" or low is None or high is None or random.random() < 0.6:
         return random.choice(edges)
-    return (
-        leaf.held(part_way(low, high, random.random()))
-        if leaf.c_type in REALS
-        else random.randint(int(low), int(high))
-    )
+    return leaf.anywhere(random, low, high)
 
 
 def order_of(served: Served, spec: OrderSpec) -> tuple[Value, ...]:

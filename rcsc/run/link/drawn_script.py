@@ -10,7 +10,6 @@ from random import Random
 from typing import TypeAlias
 
 from rcsc.code.emit.code_tree import type_bounds
-from rcsc.lang.model import part_way
 from rcsc.lang.restart import ECHO, NUMBER
 from rcsc.run.description import Description
 from rcsc.run.signature import REALS, Leaf, Signature, Value, Values
@@ -61,9 +60,7 @@ def drawn(random: Random, leaf: Leaf, before: Value, wild: float) -> Value:
         return random.choice(edges(leaf))
     if way < 0.5 or leaf.c_type == "bool":
         return random.choice(inside)
-    if leaf.c_type in REALS:
-        return leaf.held(part_way(low, high, random.random()))
-    return random.randint(int(low), int(high))
+    return leaf.anywhere(random, low, high)
 
 
 def script(

@@ -184,8 +184,7 @@ def knows(program: Program, table: Table, leaf: str, value: Value, options: Opti
     Raises:
         UndecidedError: The solver gave up.
     """
-    shared = Shared(program.kinds)
-    shared.know_words(program)
+    shared = Shared(program.kinds, program)
     meaning = Meaning(program, shared)
     here = values.equal(shared.start[leaf], values.constant(shared.kinds[leaf], value))
     whole = [assumed(table, meaning), here, values.any_of(meaning.lines(table))]

@@ -92,8 +92,7 @@ class Versions:
         befores = {
             str(earlier(name)): kind for name, kind in self.kinds.items()
         }  # what a property calls them
-        self.shared = Shared({**self.kinds, **befores})
-        self.shared.know_words(aligned.before, aligned.after)
+        self.shared = Shared({**self.kinds, **befores}, aligned.before, aligned.after)
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.tally = Tally()
         self.spare = smt.Budget(COVER_STEPS)
