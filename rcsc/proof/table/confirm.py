@@ -3,7 +3,7 @@
 In: a table and what was found. Out: whether Z3 agrees.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -25,16 +25,15 @@ def shown(program: Program, table: Table) -> list[Variable]:
     return [variable for variable in program.variables if variable.name in wanted]
 
 
-def calculated(conditions: Iterable[Expr]) -> Iterator[Expr]:
-    """Yield what conditions calculate of doubles and singles, each whole."""
-    for condition in conditions:
-        waiting = [condition]
-        while waiting:
-            expr = waiting.pop()
-            if isinstance(expr, Apply) and isinstance(expr.type, Real) and expr.op in CALCULATIONS:
-                yield expr
-            else:
-                waiting += operands(expr)
+def calculated(condition: Expr) -> Iterator[Expr]:
+    """Yield what a condition calculates of doubles and singles, each whole."""
+    waiting = [condition]
+    while waiting:
+        expr = waiting.pop()
+        if isinstance(expr, Apply) and isinstance(expr.type, Real) and expr.op in CALCULATIONS:
+            yield expr
+        else:
+            waiting += operands(expr)
 
 
 class TableSolver:
@@ -48,9 +47,6 @@ class TableSolver:
         self.frame, domain = declared(shown(program, table), [*tests, *assumed])
         self.solver = Solver(options.limits)
         self.solver.add(*domain, *(encode(condition, self.frame) for condition in assumed))
-        # Z3 makes bits of them for each question anew, a tenth of a second each, unless they stand for themselves.
-        for number in dict.fromkeys(calculated([*tests, *assumed])):
-            self.frame.named[number] = self.solver.named(encode(number, self.frame))
         self._lines: dict[int, Term] = {}
         self._tests: dict[int, Term] = {}
 
@@ -64,6 +60,11 @@ class TableSolver:
 
     def _test(self, condition: Expr, key: int) -> Term:
         if key not in self._tests:
+            # Z3 makes bits of a calculation for each question anew, a tenth of a second each, unless it stands for itself. It does so
+            # from the first test on that has it: what is asked before need not find values for it.
+            for number in calculated(condition):
+                if number not in self.frame.named:
+                    self.frame.named[number] = self.solver.named(encode(number, self.frame))
             self._tests[key] = encode(condition, self.frame)
         return self._tests[key]
 
