@@ -163,13 +163,6 @@ def next_value(kind: Scalar, value: int | float, by: int) -> int | float:
     return value if value == math.inf * by else single_of_key(single_key(value) + by)
 
 
-def part_way(low: float, high: float, part: float) -> float:
-    """Return the double at this part of the way between two, never outside: their difference may be beyond all doubles."""
-    span = high - low
-    value = low + span * part if math.isfinite(span) else low * (1.0 - part) + high * part
-    return min(max(value, low), high)
-
-
 def key_of(kind: Scalar, value: Value) -> int:
     """Return the key of `value`, a value of type `kind`."""
     if isinstance(kind, Single):

@@ -27,6 +27,13 @@ def divide(a: int, b: int) -> int:
     return quotient if (a < 0) == (b < 0) else -quotient
 
 
+def part_way(low: float, high: float, part: float) -> float:
+    """Return the double at this part of the way between two, never outside: their difference may be beyond all doubles."""
+    span = high - low
+    value = low + span * part if math.isfinite(span) else low * (1.0 - part) + high * part
+    return min(max(value, low), high)
+
+
 _SINGLE = struct.Struct("<f")
 
 

@@ -15,8 +15,7 @@ from typing import TypeAlias
 
 from rcsc.base.host.files.names import BadName, identifier, inside, shown
 from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, text
-from rcsc.lang.model import part_way
-from rcsc.lang.operator_table import single, spell_single
+from rcsc.lang.operator_table import part_way, single, spell_single
 from rcsc.lang.restart import Adopted, After, Fixed, Part, SameAs, Stands, by_names
 from rcsc.run.description import BadDescription
 

@@ -22,9 +22,8 @@ from rcsc.lang.model import (
     Single,
     Variable,
     VariableName,
-    part_way,
 )
-from rcsc.lang.operator_table import Op
+from rcsc.lang.operator_table import Op, part_way
 from rcsc.lang.operator_table import single as to_single
 from rcsc.proof.procedures.discharge import MOST_CHOICES, fewest
 from rcsc.proof.solvers import smt

@@ -31,10 +31,9 @@ from rcsc.lang.model import (
     Variable,
     key_bounds,
     key_of,
-    part_way,
     value_of_key,
 )
-from rcsc.lang.operator_table import single
+from rcsc.lang.operator_table import part_way, single
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.search import lowest
 from rcsc.proof.symbolic.values import Node, Shape, parts_first
