@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.lang.digest import Digests
+from rcsc.lang.syntax import layout, tree
 from rcsc.lang.syntax import parse as parsing
-from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.lalr import ParseNode, Tables, grammar_of_json
 from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
@@ -49,6 +49,44 @@ def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
         text = format_file(file, width)
         assert parse(Source("case.rcs", text)) == file, text
         assert format_file(file, width) == text
+
+
+@settings(max_examples=120)
+@given(
+    st.lists(
+        st.lists(st.integers(0, 99_999), min_size=1, max_size=30).map(
+            lambda row: "in {" + ", ".join(map(str, row)) + "}"
+        )
+    )
+)
+def test_a_column_knows_its_rows_at_each_width_that_it_takes(texts: list[str]) -> None:
+    """They are counted together with the width, once; widths between are as the next smaller."""
+    column = layout._Column(["the_heading_of_it - another", *texts], is_condition=True)
+    widths = [column.width]
+    while (narrower := column.narrower()) is not None:
+        column.width = narrower
+        widths.append(narrower)
+    assert column.width == column.least
+    for width, above in zip(widths[1:], widths, strict=False):
+        for between in {width, (width + above) // 2, above - 1}:
+            assert [len(pieces) for pieces in column.pieces(between)] == column.heights(width)
+
+
+def test_a_long_cell_is_filled_once_a_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    members = [f"m{number}" for number in range(400)]
+    counted: list[int] = []
+    filled = layout._filled
+
+    def counting(atoms: list[str], width: int) -> list[str]:
+        counted.append(width)
+        return filled(atoms, width)
+
+    monkeypatch.setattr(layout, "_filled", counting)
+    rows = "".join(f"| n{at} | in {{{', '.join(members[at:])}}} | {at} || {at} |\n" for at in range(4))
+    parsed = parse(Source("case.rcs", f"table t {{\n| line | a | b || o |\n{rows}}}\n"))
+    assert isinstance(parsed, tree.File)
+    assert max(map(len, format_file(parsed).splitlines())) <= layout.WIDTH
+    assert len(counted) < 4 * len(set(counted)) + 100, "each of four texts, once a width"
 
 
 @settings(max_examples=120)

@@ -36,14 +36,18 @@ class _Column:
 
     Attributes:
         atoms: The pieces into which each distinct text can be broken.
-        heights: The number of rows that each text needs at the present width.
-        narrower: The next width below that changes something, and the heights then; None where there is none.
+        least: The least width that the column can have.
+        rows: By width, the number of rows that each text needs, as far as it was asked.
+        next: By width, the next smaller one at which more texts break, as far as it was asked.
     """
 
     texts: list[str]
     is_condition: bool
     atoms: list[list[str]] = field(init=False)
     width: int = field(init=False)
+    least: int = field(init=False)
+    rows: dict[int, list[int]] = field(init=False, default_factory=dict)
+    next: dict[int, int] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         known: dict[str, list[str]] = {}
@@ -53,11 +57,7 @@ class _Column:
                 known[text] = _atoms(text, heading=False)
             self.atoms.append(known[text])
         self.width = max(map(len, self.texts))
-
-    @property
-    def least(self) -> int:
-        """The least width that the column can have."""
-        return max((len(atom.strip()) for atoms in self.atoms for atom in atoms), default=0)
+        self.least = max((len(atom.strip()) for atoms in self.atoms for atom in atoms), default=0)
 
     def pieces(self, width: int) -> list[list[str]]:
         """Return the texts, each broken into pieces no wider than `width` where possible; a heading fills its last pieces first."""
@@ -69,14 +69,22 @@ class _Column:
 
     def heights(self, width: int) -> list[int]:
         """Return the number of rows that each text needs."""
-        return list(map(len, self.pieces(width)))
+        if width not in self.rows:
+            self.rows[width] = list(map(len, self.pieces(width)))
+        return self.rows[width]
 
     def narrower(self) -> int | None:
-        """Return the next smaller width, at which more texts break; None where there is none."""
+        """Return the next smaller width, at which more texts break; None where there is none.
+
+        What is filled up to one less than the present width is filled just so up to its own longest piece.
+        """
         if self.width <= self.least:
             return None
-        distinct = {id(pieces): pieces for pieces in self.pieces(self.width - 1)}.values()
-        return max(len(piece) for pieces in distinct for piece in pieces)
+        if self.width not in self.next:
+            broken = self.pieces(self.width - 1)
+            widest = max(len(piece) for pieces in broken for piece in pieces)
+            self.rows[widest], self.next[self.width] = list(map(len, broken)), widest
+        return self.next[self.width]
 
 
 def _atoms(text: str, *, heading: bool) -> list[str]:
