@@ -89,8 +89,9 @@ def _apart(
         helps = ("give each query more steps with `--steps`, or simplify the lines",)
         message = f"whether {names} do the same could not be decided"
         return Diagnostic(Code.UNDECIDED, message, Label(meeting.span), help=helps)
-    shown = disagreement(program, table, _pair(table, meeting), options, meeting.where, near)
-    first, second = (table.lines[at] for at in _pair(table, meeting))
+    pair = _pair(table, meeting)
+    shown = None if options.bare else disagreement(program, table, pair, options, meeting.where, near)
+    first, second = (table.lines[at] for at in pair)
     return Diagnostic(
         Code.NOT_THE_SAME,
         f"{names} are said to do the same, and do not",

@@ -48,7 +48,8 @@ class Options:
         jobs: Processes that prove tables.
         cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
         brief: Whether repairs of findings, and whether overlapping lines do the same, are left for later.
-        bare: Whether any witness is enough: the least input, the region around it, and further ones are not looked for.
+        bare: Whether any witness is enough: the least input, the region around it, and further ones are not looked for, and none
+            for which lines do not do the same.
     """
 
     steps: int = STEPS

@@ -55,12 +55,10 @@ def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | No
     order = list(parts_first(*conditions))
     if len(order) > MOST_NODES:
         return None
-    random = Random(0)  # noqa: S311  # a sample, not a secret
     best: Point | None = None
-    for number in range(SAMPLES):
+    for point in _tried(variables, SAMPLES, {}):
         if smt.gives_up("what trial finds"):
             break
-        point = {variable.name: _pick(variable, number, random) for variable in variables}
         if _all_hold(order, conditions, point) and (best is None or _less(point, best, variables)):
             best = point
     return None if best is None else _lowered(order, conditions, variables, best)
@@ -186,22 +184,31 @@ def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Va
     """
     order = list(parts_first(*conditions, *goals))
     variables = [node for node in order if node.op == Shape.VARIABLE]
-    random, found = Random(0), dict[Node, Point]()  # noqa: S311  # a sample, not a secret
-    tries = min(SAMPLES, EVALUATIONS // max(1, len(order)))
-    for number in range(tries):
+    found = dict[Node, Point]()
+    for point in _tried(variables, min(SAMPLES, EVALUATIONS // max(1, len(order))), near):
         if len(found) == len(goals) or smt.gives_up("what trial finds"):
             break
         if smt.charge(len(order) // _NODES_OF_A_STEP):
             break
+        known = _known(order, point)
+        if all(known[condition] for condition in conditions):
+            found = {goal: point for goal in goals if known[goal]} | found
+    return found
+
+
+def _tried(variables: Sequence[Node], tries: int, near: Mapping[str, Value]) -> Iterator[Point]:
+    """Yield so many points, each once: the first half with the values of `near`, then with any."""
+    random, seen = Random(0), set[tuple[Value, ...]]()  # noqa: S311  # a sample, not a secret
+    for number in range(tries):
         kept = near if number < tries // 2 else {}
         point = {
             each.name: kept[each.name] if each.name in kept else _pick(each, number, random)
             for each in variables
         }
-        known = _known(order, point)
-        if all(known[condition] for condition in conditions):
-            found = {goal: point for goal in goals if known[goal]} | found
-    return found
+        values = tuple(point.values())
+        if values not in seen:
+            seen.add(values)
+            yield point
 
 
 def _pick(variable: Node, number: int, random: Random) -> Value:
