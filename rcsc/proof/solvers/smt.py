@@ -486,8 +486,8 @@ class Solver:
         self._model: Any = None
         self.names = 0
 
-    def _begin(self) -> None:
-        """Make a solver of Z3, and state to it all that is asserted."""
+    def _begin(self, assuming: tuple[Term, ...] = ()) -> None:
+        """Make a solver of Z3, and state to it all that is asserted; `assuming` is what the next question assumes."""
         self._solver: Any = _z3().Solver()
         self._broken = False
         self._solver.set("rlimit", self._given)
@@ -498,17 +498,17 @@ class Solver:
             self._solver.set("arith.enable_hnf", False)
         permanent, *pushed = self._asserted
         self._solver.add(*permanent)
-        if self._incremental:  # until something is pushed Z3 asks another solver than it did before
+        if self._incremental and not assuming:  # until something is pushed or assumed Z3 asks another solver than before
             self._solver.push()
             self._solver.pop()
         for terms in pushed:
             self._solver.push()
             self._solver.add(*terms)
 
-    def _mend(self) -> None:
+    def _mend(self, assuming: tuple[Term, ...] = ()) -> None:
         """Begin anew after a question that was broken off."""
         if self._broken:
-            self._begin()
+            self._begin(assuming)
 
     def begins_anew(self, steps: int, seed: int) -> None:
         """Bound each later question to so many steps, and seed the search anew."""
@@ -560,7 +560,7 @@ class Solver:
             return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
-        self._mend()
+        self._mend(assuming)
         self._incremental |= bool(assuming)
         self._give(min([self._steps, *(budget.left for budget in _own.budgets)]))
         try:
@@ -611,7 +611,7 @@ class Solver:
                 _cut.append(round(used_s))
                 return answer, why
             self._patience_s *= 4
-            self._begin()
+            self._begin(assuming)
 
     def _asked(self, assuming: tuple[Term, ...]) -> tuple[Any, bool]:
         """Return Z3's answer, and whether it was broken off."""
