@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import EnumType, IntEnum
+from itertools import product
 from pathlib import Path
 from random import Random
 from types import ModuleType
@@ -436,6 +437,22 @@ def test_whatever_an_extern_gives_the_executor_does_as_the_interpreter(
         shown = {name: getattr(state, name) for name in ("n", "k", "o")}
         assert (fault, shown) == (outcome.fault, {name: outcome.snapshot[name] for name in shown}), one
         assert fault in ((Fault.OK,) if not writes else (Fault.OK, Fault.EXTERN))
+
+
+@pytest.mark.parametrize(
+    "about", list(product(("", "(k : int 0 .. 9)"), ("", "reads x"), ("", "writes n"))), ids=" ".join
+)
+def test_an_extern_uses_all_that_its_function_has_or_discards_it(
+    about: tuple[str, ...], tmp_path: Path
+) -> None:
+    params, reads, writes = about
+    call = "p(3)" if params else "p"
+    text = (
+        "input x : int 0 .. 9\nstate n : int 0 .. 9\n"
+        f'extern procedure p{params} {reads} {writes} python "users:p" c "users_p"\n'
+        f"table t {{\n| line | x || procedures |\n| a | > n || {call} |\n| b | <= n || |\n}}\n"
+    )
+    compiled(emitted(program_of(text)), tmp_path)
 
 
 def test_what_externs_are_called_meets_nothing_of_ours(tmp_path: Path) -> None:

@@ -12,11 +12,13 @@ from typing import Any
 
 import pytest
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces, usual_length
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.lang.expressions.previous import AT_ONCE
 from rcsc.lang.hidden import fed_with, matched
 from rcsc.lang.interpret import Fault, Outcome, cycle, evaluate, initial, run_table
 from rcsc.lang.model import Program, Value
@@ -196,6 +198,19 @@ def test_what_is_wrong_with_a_time_is_said(text: str, code: str, message: str) -
     assert any(found.code.value == code and found.message.startswith(message) for found in refused(text)), [
         (found.code, found.message, found.help) for found in refused(text)
     ]
+
+
+@pytest.mark.parametrize(
+    "heading", ["x - was x", "was x", "@C(x)", "@T(b) and b", "b for 200 [ms]", "b and not (was b)"]
+)
+def test_what_a_heading_looks_back_at_has_no_time(heading: str) -> None:
+    """A counter counts where the cycle ends, one after the other: of a heading that counts it would count what is new already."""
+    cell = "> 1" if heading.endswith("was x") else "true"
+    told = f"output told : bool\ntable tell {{\n| line | {heading} || told |\n| a | {cell} TIME || true |\n| c | DEFAULT || false |\n}}\n"
+    text = after(("table watch }", "table watch table tell }")) + told
+    program_of(text.replace("TIME", ""))
+    [found] = refused(text.replace("TIME", "for 300 [ms]"))
+    assert (found.code, found.message) == (Code.NO_CYCLE_BEFORE, AT_ONCE)
 
 
 WAYS = (

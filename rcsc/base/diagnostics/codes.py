@@ -859,7 +859,7 @@ class Code(StrEnum):
     `was x` is the value that `x` had after the cycle before, and an event, `@T(c)`, is of that cycle and this one. An invariant is about
     one state, and a constant about none: they cannot look back. `was` is about variables, not about locals or constants alone. What has
     to hold for a time, `c for 2 [s]`, is counted where each cycle ends: no local or parameter is known there. Neither `was` nor events
-    nest, and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one cycle.
+    nest, nor has what holds for a time either, or another `for`, be it by the heading; and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one cycle.
 
         state n : int 0 .. 9
         invariant grows : n >= was n

@@ -8,9 +8,9 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
+from rcsc.lang.expressions.previous import AT_ONCE
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import (
-    AT_ONCE,
     among,
     between,
     boolean,

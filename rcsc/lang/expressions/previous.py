@@ -68,6 +68,7 @@ def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
     return past
 
 
+AT_ONCE = "what has to hold for a time is a condition of one cycle, without `was`, events and another `for`"
 MOST_CYCLES = 2**32 - 1
 _MS = {(("ms", 1),): 1, (("s", 1),): 1000}
 """Milliseconds of each unit of time."""
@@ -126,6 +127,11 @@ def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -
         message = f"`{local.name}` is known in its procedure alone: what has to hold for a time is counted where each cycle ends"
         helps = "say it of variables and constants: of a state, if need be, that keeps the value"
         scope.report(Code.NO_CYCLE_BEFORE, message, local.span, helps)
+        return None
+    kept = {*scope.previous.values(), *(held.counter for held in scope.held.values())}
+    if not kept.isdisjoint(read_by(condition)):  # by the heading, where the cell has none of them
+        helps = "give the heading's value to a variable, in a table before, and say it of that"
+        scope.report(Code.NO_CYCLE_BEFORE, AT_ONCE, span, helps)
         return None
     key = spelled(_plain(condition))
     known = scope.held.get(key)

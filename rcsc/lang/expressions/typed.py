@@ -22,7 +22,7 @@ from rcsc.lang.expressions.operators import (
     one_kind,
     scaled,
 )
-from rcsc.lang.expressions.previous import before, cycles_of, lasting
+from rcsc.lang.expressions.previous import AT_ONCE, before, cycles_of, lasting
 from rcsc.lang.expressions.scope import Body, Constant, Scope
 from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
@@ -385,9 +385,6 @@ def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar 
         operand = typed(scope, body, written, want)
     past = None if operand is None else before(scope, operand.expr, span)
     return None if operand is None or past is None else Typed(past, operand.bare)
-
-
-AT_ONCE = "what has to hold for a time is a condition of one cycle, without `was`, events and another `for`"
 
 
 def for_a_time(

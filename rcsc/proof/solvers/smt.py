@@ -498,7 +498,7 @@ class Solver:
             self._solver.set("arith.enable_hnf", False)
         permanent, *pushed = self._asserted
         self._solver.add(*permanent)
-        if self._incremental and not assuming:  # until something is pushed or assumed Z3 asks another solver than before
+        if self._incremental and not assuming:  # until then Z3 asks another solver than it did before
             self._solver.push()
             self._solver.pop()
         for terms in pushed:

@@ -32,9 +32,10 @@ def procedure_function(c: CProgram, procedure: Procedure) -> Function:
     """Return the function of a procedure."""
     params = [f"{c.p}_t *s", *(f"{_held(c, p.type)} {local_word(p.name)}" for p in procedure.params)]
     head = f"void {c.p}_do_{c.names.procedures[procedure.name]}({', '.join(params)})"
-    body = _extern_body(c, procedure) if procedure.extern else _body(c, procedure)
+    body = tuple(_extern_body(c, procedure) if procedure.extern else _body(c, procedure))
+    unread = () if touches_state(body) else (discarded(STATE),)
     origin = Origin(Sort.PROCEDURE, procedure.name)
-    return Function(comment(stated(procedure, c.plan.files)), head, tuple(body), origin=origin)
+    return Function(comment(stated(procedure, c.plan.files)), head, (*body, *unread), origin=origin)
 
 
 def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
@@ -47,8 +48,6 @@ def _body(c: CProgram, procedure: Procedure) -> Iterator[Stmt]:
         discarded(variable) for variable in named if variable.text not in used
     )  # set, perhaps, and never read
     yield from body
-    if not touches_state(body):
-        yield discarded(STATE)
 
 
 def _held(c: CProgram, kind: model.Scalar) -> str:
