@@ -213,6 +213,26 @@ table t assuming ordered {{
     assert all(found.severity is Severity.WARNING for found in warnings)
 
 
+@pytest.mark.parametrize(("word", "said"), [("same", "are said to do the same"), ("above", "are ordered")])
+def test_lines_that_meet_only_where_an_assumption_fails_are_told_as_such(word: str, said: str) -> None:
+    """To leave the word out would leave two lines there, and none that goes first."""
+    text = f"""
+input x : int 0 .. 9
+output o : bool
+assume small monitored : x <= 8
+table t assuming small {{
+  | line         | x || o    |
+  | e {word} b   | 9 || true |
+  | b            |   || true |
+}}"""
+    [found] = [found for found in reported(text, Options()) if found.code.value == "RCS423"]
+    assert (
+        found.message
+        == f"lines `e` and `b` of table `t` {said}, and match together only where an assumption fails"
+    )
+    assert (found.help, found.notes) == ((), ("under `small`",))
+
+
 def test_the_checker_settles_it_itself_and_refuses_what_is_not_so(monkeypatch: pytest.MonkeyPatch) -> None:
     verdict = verdict_of(INJECTION)
     outcome = certify(program_of(INJECTION), dict(verdict.certificate or {}))

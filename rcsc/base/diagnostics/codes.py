@@ -858,8 +858,9 @@ class Code(StrEnum):
 
     `was x` is the value that `x` had after the cycle before, and an event, `@T(c)`, is of that cycle and this one. An invariant is about
     one state, and a constant about none: they cannot look back. `was` is about variables, not about locals or constants alone. What has
-    to hold for a time, `c for 2 [s]`, is counted where each cycle ends: no local or parameter is known there. Neither `was` nor events
-    nest, nor has what holds for a time either, or another `for`, be it by the heading; and neither what stands before `then` nor either side of `until` or `upon` can have them: these are each about one cycle.
+    to hold for a time, `c for 2 [s]`, is counted where each cycle ends: no local or parameter is known there, and neither the condition
+    nor the heading above it has `was`, an event or another `for`. Neither `was` nor events nest, and neither what stands before `then`
+    nor either side of `until` or `upon` can have them: these are each about one cycle.
 
         state n : int 0 .. 9
         invariant grows : n >= was n
@@ -1413,7 +1414,8 @@ class Code(StrEnum):
     NEVER_MEET = """RCS423: `above` or `same` between lines that never match together
 
     `above` says which line runs, and `same` that it does not matter which, where two lines match together. These never do, under the
-    declared ranges, the invariants and what the table assumes: what their author meant is not what their conditions say.
+    declared ranges, the invariants and what the table assumes: what their author meant is not what their conditions say. Where they do
+    so if an assumption fails, the word counts there, and the message says it.
 
         input stop : bool
         output go : bool

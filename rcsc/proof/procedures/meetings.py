@@ -40,6 +40,7 @@ def met(program: Program, table: Table, options: Options) -> Met:
     invariants = tuple(AssumptionName(invariant.name) for invariant in program.invariants)
     every = tuple(dict.fromkeys((*invariants, *table.assumptions)))
     grounds = [replace(table, assumptions=names) for names in dict.fromkeys(((), invariants, every))]
+    anywhere = replace(table, assumptions=invariants)
     findings: list[Diagnostic] = []
     relied: set[AssumptionName] = set()
     open_: set[tuple[str, str]] = set()
@@ -48,7 +49,10 @@ def met(program: Program, table: Table, options: Options) -> Met:
         if there is Answer.UNKNOWN:
             open_.add((str(pair_said.first), str(pair_said.second)))
         if there is Answer.UNSATISFIABLE:
-            findings.append(_never(table, pair_said))
+            beyond = (
+                bool(table.assumptions) and meeting(program, anywhere, pair_said.where, options) is not there
+            )
+            findings.append(_never(table, pair_said, beyond=beyond))
         elif pair_said.same:
             pair = _pair(table, pair_said)
             near = None if isinstance(there, Answer) else there
@@ -67,12 +71,20 @@ def _pair(table: Table, meeting: Meeting) -> tuple[int, int]:
     return places[meeting.first], places[meeting.second]
 
 
-def _never(table: Table, meeting: Meeting) -> Diagnostic:
-    """Warn that a `same` or `above` declaration never applies."""
+def _never(table: Table, meeting: Meeting, *, beyond: bool) -> Diagnostic:
+    """Warn that a `same` or `above` declaration never applies, or only where an assumption fails (`beyond`), as far as is known."""
     said = "are said to do the same" if meeting.same else "are ordered"
-    message = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}` {said}, and never match together"
-    helps = (f"leave `{'same' if meeting.same else 'above'}` out, or correct the conditions",)
-    return Diagnostic(Code.NEVER_MEET, message, Label(meeting.span), help=helps, severity=Severity.WARNING)
+    when = "match together only where an assumption fails" if beyond else "never match together"
+    message = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}` {said}, and {when}"
+    word = "same" if meeting.same else "above"
+    return Diagnostic(
+        Code.NEVER_MEET,
+        message,
+        Label(meeting.span),
+        notes=(f"under {', '.join(f'`{name}`' for name in table.assumptions)}",) if beyond else (),
+        help=() if beyond else (f"leave `{word}` out, or correct the conditions",),
+        severity=Severity.WARNING,
+    )
 
 
 def _apart(

@@ -127,6 +127,8 @@ def confirm(
     asked = TableSolver(program, table, options)
     gaps = [finding for finding in findings if isinstance(finding, Gap)]
     gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None  # while the solver knows no line
+    if gap is Answer.UNKNOWN:
+        return Agreement.UNKNOWN
     overlap = _some_overlap(asked)
     answers = (
         (overlap, any(isinstance(finding, Overlap) for finding in findings)),
@@ -144,8 +146,9 @@ def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
         named = [v for v in shown(asked.program, asked.table) if v.name in witness]
         point = [(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name])) for v in named]
         here = [smt.equal(leaf, value, v.type) for v, (leaf, value) in zip(named, point, strict=True)]
-        if asked.holds(smt.at_point(asked.none(), point), *here) is Answer.SATISFIABLE:
-            return Answer.SATISFIABLE
+        answer = asked.holds(smt.at_point(asked.none(), point), *here)
+        if answer is not Answer.UNSATISFIABLE:  # what is not decided there, is not among all inputs either
+            return answer
     return asked.holds(asked.none())
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
 from rcsc.base.diagnostics.source import Source, Span
-from rcsc.lang.model import Program, Table, spell
+from rcsc.lang.model import AssumptionName, Program, Table, spell
 from rcsc.lang.project import Loaded
 from rcsc.lang.resolve import resolve
 from rcsc.lang.syntax import tree
@@ -31,11 +31,19 @@ class Against:
         diagnostics: The differences; empty where it is proved to be the same.
         questions: The number of questions put to Z3.
         sources: Texts that `diagnostics` point into.
+        where: The assumptions under which it is: both may do something else where one fails.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     questions: int = 0
     sources: Mapping[str, Source] | None = None
+    where: tuple[AssumptionName, ...] = ()
+
+    def __str__(self) -> str:
+        """Say what was proved; there are no differences."""
+        names = ", ".join(f"`{name}`" for name in self.where)
+        holds = f" where {names} {'holds' if len(self.where) == 1 else 'hold'}" if names else ""
+        return f"{holds}: proved, {self.questions} questions"
 
 
 def in_place(file: tree.File, table: tree.TableDecl) -> str:
@@ -77,14 +85,26 @@ def against(
         shown = tuple(_renamed(diagnostic, table.file, name) for diagnostic in resolved)
         return Against(shown, sources={**loaded.sources, name: Source(name, text)})
     other = resolved.table(table.name)
-    verdict = compare((program, table), (resolved, other), options)
+    where, verdict = _compared(program, table, (resolved, other), options)
     if isinstance(verdict, Same) and set(other.assumptions) != set(table.assumptions):
         return Against((_assuming(table, other),))
     begins = _begins(program, table, new)
     if isinstance(verdict, Same) and begins is not None:
         return Against((begins,))
     questions = verdict.questions if isinstance(verdict, Same) else 0
-    return Against(_findings(verdict, program, table), questions, loaded.sources)
+    return Against(_findings(verdict, program, table), questions, loaded.sources, where)
+
+
+def _compared(
+    program: Program, table: Table, other: tuple[Program, Table], options: Options
+) -> tuple[tuple[AssumptionName, ...], Comparison]:
+    """Compare the tables for every input that invariants admit, and if they differ there for those that the assumptions admit, too."""
+    bare = replace(table, assumptions=())
+    tables = tuple(bare if each.name == table.name else each for each in program.tables)
+    verdict = compare((replace(program, tables=tables), bare), other, options)
+    if isinstance(verdict, Same) or not table.assumptions:
+        return (), verdict
+    return table.assumptions, compare((program, table), other, options)
 
 
 def _renamed(diagnostic: Diagnostic, file: str, name: str) -> Diagnostic:

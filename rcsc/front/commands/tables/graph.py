@@ -15,7 +15,7 @@ from rcsc.views.graph.formats.choice import FORMS
 from rcsc.views.graph.formats.state_graph import LINES
 from rcsc.views.graph.layout import PACKAGE, NoLayoutError
 from rcsc.views.graph.lines import derive_lines
-from rcsc.views.graph.round_trip import against
+from rcsc.views.graph.round_trip import Against, against
 from rcsc.views.graph.to_table import tabled
 
 
@@ -119,10 +119,8 @@ def _draw(entry: FoundTable, form: str, derived: Derived, out: Path | None, opti
             f"{name}: no line matches any input, and no table is read back from an empty graph", err=True
         )
         return
-    questions = _read_back(entry, form, text, options)
-    click.echo(
-        f"{name}: the table read back from the graph does the same: proved, {questions} questions", err=True
-    )
+    verdict = _read_back(entry, form, text, options)
+    click.echo(f"{name}: the table read back from the graph does the same{verdict}", err=True)
 
 
 def _drawing(entry: FoundTable, derived: Derived) -> str:
@@ -137,10 +135,10 @@ def _drawing(entry: FoundTable, derived: Derived) -> str:
         raise WrongError((diagnostic,), entry.loaded.sources) from error
 
 
-def _read_back(entry: FoundTable, form: str, text: str, options: Options) -> int:
-    """Prove that the written graph says the table; return the number of questions."""
+def _read_back(entry: FoundTable, form: str, text: str, options: Options) -> Against:
+    """Prove that the written graph says the table."""
     read_table = tabled(FORMS[form].read(text))
     verdict = against(entry.loaded, entry.root, entry.program, entry.table, read_table, options)
     if verdict.diagnostics:
         raise WrongError(verdict.diagnostics, {**entry.loaded.sources, **(verdict.sources or {})})
-    return verdict.questions
+    return verdict

@@ -80,7 +80,7 @@ def _prove(read_table: Tabled, named: str, options: Options) -> None:
     if verdict.diagnostics:
         raise WrongError(verdict.diagnostics, {**entry.loaded.sources, **(verdict.sources or {})})
     where = f"{entry.table.file}:{entry.table.name}"
-    click.echo(f"{name}: does the same as {where}: proved, {verdict.questions} questions", err=True)
+    click.echo(f"{name}: does the same as {where}{verdict}", err=True)
 
 
 def _placed(read_table: Tabled, file: str) -> str:
