@@ -952,10 +952,8 @@ def test_what_is_the_same_under_assumptions_alone_is_said_to_be_so(tmp_path: Pat
 def test_graph_and_table_are_each_other_s_way_back(form: str, assuming: str, tmp_path: Path) -> None:
     status, text, notes = run("graph", assuming, "--form", form)
     assert status == 0
-    assert (
-        "acquire: the table read back from the graph does the same where `acquire_states` holds: proved"
-        in notes
-    )
+    under = "`acquire_states`, `acquire_in_step`, `acquire_resting`"
+    assert f"acquire: the table read back from the graph does the same where {under} hold: proved" in notes
     assert "note[RCS774]: acquire: not in the graph: line `10`" in notes
     status, made, proved = run("table", "-", "--against", assuming, stdin=text)
     assert (status, "does the same as" in proved) == (0, True)
