@@ -6,13 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, initial, run_table
 from rcsc.lang.model import Program
 from rcsc.proof.certify import certify
+from rcsc.proof.procedures import meetings
 from rcsc.proof.procedures.meetings import Met
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.table import program as proving
 from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import program_of, reported, verdict_of
@@ -231,6 +234,36 @@ table t assuming small {{
         == f"lines `e` and `b` of table `t` {said}, and match together only where an assumption fails"
     )
     assert (found.help, found.notes) == ((), ("under `small`",))
+
+
+WORDS = """
+state a : int 0 .. 4294967295
+output o : int 0 .. 9
+table t {
+  | line       | a[3..0]   | a                                    || o |
+  | n1         | in {0, 8} | 0bx1xx1xxx10x0x1xxxxxxxxx1011xx01x    || 1 |
+  | n2 same n1 |           |                                      || 2 |
+}"""
+
+
+def test_bits_tell_lines_apart_that_are_said_to_do_the_same() -> None:
+    assert [each.code for each in reported(WORDS, Options()) if "`n1` and `n2`" in each.message] == [
+        Code.NEVER_MEET
+    ]
+
+
+@pytest.mark.parametrize("bare", [False, True])
+def test_of_lines_that_may_never_meet_nothing_is_said_to_differ(
+    bare: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What each line leaves is another thing whatever the input; whether there is one at which both match was left open."""
+    monkeypatch.setattr(meetings, "meeting", lambda *_: Answer.UNKNOWN)
+    program = program_of(WORDS)
+    [found] = meetings.met(program, program.tables[0], Options(bare=bare)).findings
+    assert (found.code, found.message) == (
+        Code.UNDECIDED,
+        "whether lines `n1` and `n2` of table `t` do the same could not be decided",
+    )
 
 
 def test_the_checker_settles_it_itself_and_refuses_what_is_not_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,7 +62,7 @@ def met(program: Program, table: Table, options: Options) -> Met:
                     relied |= {*ground.assumptions}
                     break
             else:
-                findings.append(_apart(program, grounds[-1], pair_said, effects, options, near or {}))
+                findings.append(_apart(program, grounds[-1], pair_said, effects, options, near))
     return Met(tuple(findings), frozenset(relied), frozenset(open_))
 
 
@@ -93,16 +93,24 @@ def _apart(
     meeting: Meeting,
     effects: Effects,
     options: Options,
-    near: Mapping[str, Value],
+    near: Mapping[str, Value] | None,
 ) -> Diagnostic:
-    """Report that two lines do not do the same, with an input, or that this could not be decided."""
+    """Report that two lines do not do the same, with an input, or that this could not be decided.
+
+    Without an input `near` at which both match they may never do so, and what they leave different is none.
+    """
     names = f"lines `{meeting.first}` and `{meeting.second}` of table `{table.name}`"
-    if effects.same is None:
+    pair = _pair(table, meeting)
+    decided = effects.same is not None
+    shown = (
+        disagreement(program, table, pair, options, meeting.where, near or {})
+        if decided and not options.bare
+        else None
+    )
+    if not decided or (near is None and shown is None):
         helps = ("give each query more steps with `--steps`, or simplify the lines",)
         message = f"whether {names} do the same could not be decided"
         return Diagnostic(Code.UNDECIDED, message, Label(meeting.span), help=helps)
-    pair = _pair(table, meeting)
-    shown = None if options.bare else disagreement(program, table, pair, options, meeting.where, near)
     first, second = (table.lines[at] for at in pair)
     return Diagnostic(
         Code.NOT_THE_SAME,

@@ -84,7 +84,7 @@ def meeting(program: Program, table: Table, where: Expr, options: Options) -> Ma
         read = {str(name) for each in there for name in read_by(each)}
         return {name: value for name, value in seen.items() if name in read}
     try:
-        nodes = list(map(Run.of(program, {}).evaluate, there))
+        nodes = list(map(Run.of(program, Shared(program.kinds, program).start).evaluate, there))
         return answered(("meeting",), nodes, lambda: _point(nodes, options))
     except smt.troubles():
         return Answer.UNKNOWN
