@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from itertools import product
 from operator import itemgetter
 
-from rcsc.lang.interpret import Fault
+from rcsc.lang.interpret import Fault, evaluate
+from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Enum, Int, Kind, Program, Value, Variable
 from rcsc.lang.restart import Part, Stands, by_names
 from rcsc.run.adopt import adopt
@@ -30,20 +31,29 @@ class TooManyError(Exception):
 
 
 def restarts(role: Role) -> Iterator[dict[str, Value]]:
-    """The states with which a level begins anew, whatever stands in its buffers."""
+    """The states with which a level begins anew, whatever stands in its buffers that its neighbours may write there."""
     remembered = [leaf for leaf in role.inputs if leaf in role.remembered]
-    choices = [
-        (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
-        for leaf in remembered
-    ]
     standing = [str(leaf) for leaf, how in role.program.adopted.items() if how == Stands()]
-    choices += [
-        (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
-        for leaf in standing
-    ]
-    for values in product(*choices):
+    for values in product(*(_few(role, leaf) for leaf in (*remembered, *standing))):
         now = role.start | dict(zip(remembered, values, strict=False))
-        yield adopted(role, now, dict(zip(standing, values[len(remembered) :], strict=True)))
+        if _owed(role, now):
+            yield adopted(role, now, dict(zip(standing, values[len(remembered) :], strict=True)))
+
+
+def _few(role: Role, leaf: str) -> tuple[Value, ...]:
+    """Values of a leaf; two of a number."""
+    return (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
+
+
+def _owed(role: Role, now: dict[str, Value]) -> bool:
+    """Whether what stands in the buffers is as the neighbours owe it, for some values of what is not remembered."""
+    facts = [fact.condition for fact in role.links.given]
+    read = {str(leaf) for fact in facts for leaf in read_by(fact)}
+    free = sorted(read - role.remembered)
+    return any(
+        all(evaluate(fact, {**now, **dict(zip(free, values, strict=True))}) is True for fact in facts)
+        for values in product(*(_few(role, leaf) for leaf in free))
+    )
 
 
 def adopted(
