@@ -908,6 +908,41 @@ class Maker:
     # --- tables ---
 
     def cell(self, leaf: Leaf) -> tuple[str, Expr | None]:
+        """A condition cell over a leaf, now or with an event; blank now and then, and where nothing would satisfy it."""
+        text, now = self.plain_cell(leaf)
+        if not self.back or self.rng.randrange(4):
+            return text, now
+        text, event = self.event_cell(leaf, text, now)
+        return ("", None) if self.possible(event) is None else (text, event)
+
+    def event_cell(self, leaf: Leaf, text: str, now: Expr | None) -> tuple[str, Expr]:
+        """An event of a leaf, or that it does not happen: of its truth, of what a cell says of it, or of its value."""
+        name, truth = leaf.name, leaf.kind.sort == "bool"
+        happens: Meaning = lambda s, v: s[name] != s[PAST][name]  # noqa: E731 - the first of two
+        word = self.rng.choice(("@T", "@F", "@C")) if truth or now is not None else "@C"
+        holds: Meaning = (lambda s, v: s[name]) if truth or now is None else now.of
+        if word != "@C":
+            to = word == "@T"
+            happens = lambda s, v: holds(s, v) is to and holds(s[PAST], v) is not to  # noqa: E731
+        of = "" if truth or word == "@C" else f"({text})"
+        if self.rng.randrange(4) == 0:
+            when = self.about_now()
+            return f"{word}{of} when {when.text}", Expr(
+                BOOL, "", lambda s, v: happens(s, v) and when.of(s[PAST], v)
+            )
+        turned = self.rng.randrange(3) == 0
+        return f"{'not ' if turned else ''}{word}{of}", Expr(
+            BOOL, "", lambda s, v: bool(happens(s, v)) is not turned
+        )
+
+    def about_now(self) -> Expr:
+        """A condition of one cycle, about a variable."""
+        self.back = False
+        now = self.about(self.truth(1))
+        self.back = True
+        return Expr(BOOL, f"({now.text})", now.of)
+
+    def plain_cell(self, leaf: Leaf) -> tuple[str, Expr | None]:
         """A condition cell over a leaf; blank now and then, and where no value would satisfy it."""
         rng, kind = self.rng, leaf.kind
         if rng.randrange(3) == 0:

@@ -18,7 +18,7 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces, usual_length
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import Verdict, prove_level
-from rcsc.lang.expressions.previous import AT_ONCE
+from rcsc.lang.expressions.previous import AT_ONCE, OF_A_VARIABLE
 from rcsc.lang.hidden import fed_with, matched
 from rcsc.lang.interpret import Fault, Outcome, cycle, evaluate, initial, run_table
 from rcsc.lang.model import Program, Value
@@ -26,6 +26,7 @@ from rcsc.lang.restart import Fixed, SameAs
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
+from rcsc.lang.syntax.spell import spell_expr
 from rcsc.proof.relation.same import Same, compare
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.program import prove_program
@@ -561,6 +562,95 @@ def test_what_is_of_one_moment_cannot_look_back(declared: str, place: str) -> No
     whole = f"state s : bool\n{declared}\n"
     codes = [(f.code.value, whole[f.primary.span.start : f.primary.span.end]) for f in refused(whole)]
     assert ("RCS315", place) in codes
+
+
+CELLS = {
+    ("a", "@T"): "@T(a)",
+    ("a", "not @F"): "not @F(a)",
+    ("a", "@C"): "@C(a)",
+    ("a", "@T when n > 3 and b"): "@T(a) when n > 3 and b",
+    ("a or b", "@F"): "@F(a or b)",
+    ("n", "@C when b"): "@C(n) when b",
+    ("n", "@T(3)"): "@T(n = 3)",
+    ("n", "@F(> 3)"): "@F(n > 3)",
+    ("n", "not @T(/= 3)"): "not @T(n /= 3)",
+    ("n", "@T(2 .. 5) when b"): "@T(n in 2 .. 5) when b",
+    ("n", "@T(not in 2 .. 5)"): "@T(n not in 2 .. 5)",
+    ("n", "@F(in {1, 3 .. 5})"): "@F(n in {1, 3 .. 5})",
+    ("n", "@T(not in odd)"): "@T(n not in odd)",
+    ("n + 1", "@T(4)"): "@T(n + 1 = 4)",
+    ("m", "@T(on)"): "@T(m = on)",
+    ("w", "@T(x0xx 1010)"): "@T(w = 0bx0xx_1010)",
+    ("w", "@F(x0xx 1010, 1xxx xxxx)"): "@F(w in {0bx0xx_1010, 0b1xxx_xxxx})",
+    ("a", "= @T(b)"): "a = @T(b)",
+    ("a", "= (not @T(b))"): "a = (not @T(b))",
+}
+"""A heading, a cell under it, and what it means."""
+
+
+def cells_of(heading: str, cell: str, whole: str) -> str:
+    return (
+        "enum mode { off, on }\nset odd : int 0 .. 9 = {1, 3, 5, 7, 9}\n"
+        "input a : bool\ninput b : bool\ninput m : mode\ninput n : int 0 .. 9\ninput w : int 0 .. 255\n"
+        f"table t {{\n| line | {heading} | when ||\n| x | {cell} | {whole} ||\n}}\n"
+    )
+
+
+@pytest.mark.parametrize(("heading", "cell"), CELLS)
+def test_an_event_in_a_cell_is_of_its_heading(heading: str, cell: str) -> None:
+    source = cells_of(heading, cell, CELLS[heading, cell])
+    of_heading, whole = program_of(source).tables[0].lines[0].tests
+    assert of_heading is not None
+    assert whole is not None
+    assert of_heading.condition == whole.condition
+    parsed = parse(Source("case.rcs", source))
+    assert isinstance(parsed, tree.File)
+    laid_out = format_file(parsed)
+    assert f"| {cell} " in laid_out
+    [declared] = [one for one in parsed.declarations if isinstance(one, tree.TableDecl)]
+    written = declared.rows[0].conditions[0]
+    assert written is not None
+    assert spell_expr(tree.term(declared.conditions[0], written)) == CELLS[heading, cell]
+
+
+def test_a_list_in_an_event_is_a_set() -> None:
+    listed, braced = (
+        program_of(cells_of("n", f"@T({text})", "a")).tables[0].lines[0].tests[0]
+        for text in ("1, 3 .. 5", "in {1, 3 .. 5}")
+    )
+    assert listed is not None
+    assert braced is not None
+    assert listed.condition == braced.condition
+
+
+ALONE = "write `@{}`; an event of something else stands in a column headed `when`"
+
+
+@pytest.mark.parametrize(
+    ("heading", "cell", "code", "place", "helps"),
+    [
+        ("a", "@T(b)", "RCS301", "@T(b)", ALONE.format("T")),
+        ("a", "not @F(true)", "RCS301", "not @F(true)", ALONE.format("F")),
+        ("n", "@C(3)", "RCS301", "@C(3)", ALONE.format("C")),
+        ("n", "@T", "RCS301", "@T", "say what it came to be: `@T(> 3)`, `@T(3)`"),
+        ("n", "@T(a)", "RCS301", "a", "a whole condition stands in a column headed `when`"),
+        ("n", "@X", "RCS201", "@X", None),
+        ("a", "@T when n", "RCS301", "n", None),
+        ("a", "@T when was b", "RCS315", "was b", None),
+        ("n", "@T(was n)", "RCS315", "was n", None),
+        ("n", "@T(> 3 for 2 [s])", "RCS101", "for", None),
+        ("was a", "@T", "RCS315", "@T", OF_A_VARIABLE),
+        ("@T(a)", "@F", "RCS315", "@F", OF_A_VARIABLE),
+    ],
+)
+def test_an_event_in_a_cell_that_is_none_of_its_heading(
+    heading: str, cell: str, code: str, place: str, helps: str | None
+) -> None:
+    source = cells_of(heading, cell, "b")
+    finding = refused(source)[0]
+    span = finding.primary.span
+    assert (finding.code.value, source[span.start : span.end]) == (code, place)
+    assert helps is None or finding.help == (helps,)
 
 
 def test_help_names_the_events() -> None:

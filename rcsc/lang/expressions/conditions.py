@@ -8,13 +8,14 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
-from rcsc.lang.expressions.previous import AT_ONCE
+from rcsc.lang.expressions.previous import AT_ONCE, OF_A_VARIABLE, OF_TWO_CYCLES, looks_back
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import (
     among,
     between,
     boolean,
     for_a_time,
+    happening,
     masked,
     other_than,
     typed,
@@ -106,6 +107,8 @@ class Tests:
         return None if value is True else Test(text, placed(condition, cell), names, box)
 
     def _condition(self, column: int, written: tree.Condition) -> Expr | None:
+        if isinstance(written, tree.Happens):
+            return self._happens(column, written)
         if not isinstance(written, tree.Lasting):
             return self._untimed(column, written)
         with without_before(self.scope, AT_ONCE):
@@ -115,6 +118,38 @@ class Tests:
         text = f"{self.texts[column]} {spell_condition(written.condition, False)}"
         held = for_a_time(self.scope, Body(), condition, text, written.time, written.span)
         return None if held is None else held.expr
+
+    def _happens(self, column: int, written: tree.Happens) -> Expr | None:
+        subject = self.subjects[column]
+        if subject is None:
+            return None
+        event = happening(self.scope, Body(), written, lambda: self._operand(column, subject, written))
+        if event is None:
+            return None
+        return Apply(Op.NOT, (event.expr,), Bool(), written.span) if written.negated else event.expr
+
+    def _operand(self, column: int, subject: Typed, written: tree.Happens) -> Typed | None:
+        """Resolve what an event in a cell is about: the heading, or a condition on it."""
+        word, operand, heading = written.word.text, written.operand, self.texts[column]
+        truth = isinstance(subject.expr.type, Bool)
+        if looks_back(self.scope, subject.expr):
+            self.scope.report(Code.NO_CYCLE_BEFORE, OF_TWO_CYCLES, written.span, OF_A_VARIABLE)
+            return None
+        if operand is None and not truth and word != "@C":
+            message = f"`{word}` alone is of a heading that is true or false, `{heading}` is {kind_word(subject.expr.type)}"
+            self.scope.report(
+                Code.KIND, message, written.span, f"say what it came to be: `{word}(> 3)`, `{word}(3)`"
+            )
+            return None
+        if operand is not None and (truth or word == "@C"):
+            message = f"`{word}` in this cell is of the heading `{heading}`, and stands alone"
+            helps = f"write `{word}`; an event of something else stands in a column headed `when`"
+            self.scope.report(Code.KIND, message, written.span, helps)
+            return None
+        if operand is None:
+            return subject
+        condition = self._untimed(column, operand)
+        return None if condition is None else Typed(condition)
 
     def _untimed(self, column: int, written: tree.Comparison | tree.OneOf | tree.Between) -> Expr | None:
         scope, body = self.scope, Body()

@@ -69,6 +69,8 @@ def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
 
 
 AT_ONCE = "what has to hold for a time is a condition of one cycle, without `was`, events and another `for`"
+OF_TWO_CYCLES = "an event is of two cycles, and cannot be part of `was` or of another event"
+OF_A_VARIABLE = "give the heading's value to a variable, in a table before, and say it of that"
 MOST_CYCLES = 2**32 - 1
 _MS = {(("ms", 1),): 1, (("s", 1),): 1000}
 """Milliseconds of each unit of time."""
@@ -116,6 +118,12 @@ def _period(scope: Scope, span: Span) -> int | None:
     return None
 
 
+def looks_back(scope: Scope, expr: Expr) -> bool:
+    """Return whether an expression is of the cycle before already, or of several."""
+    kept = {*scope.previous.values(), *(held.counter for held in scope.held.values())}
+    return not kept.isdisjoint(read_by(expr))
+
+
 def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -> Expr | None:
     """Return the condition that `condition` (spelled `text`) holds and held after each of the last `cycles` cycles; None after an error."""
     if next(read_by(condition), None) is None:
@@ -128,10 +136,8 @@ def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -
         helps = "say it of variables and constants: of a state, if need be, that keeps the value"
         scope.report(Code.NO_CYCLE_BEFORE, message, local.span, helps)
         return None
-    kept = {*scope.previous.values(), *(held.counter for held in scope.held.values())}
-    if not kept.isdisjoint(read_by(condition)):  # by the heading, where the cell has none of them
-        helps = "give the heading's value to a variable, in a table before, and say it of that"
-        scope.report(Code.NO_CYCLE_BEFORE, AT_ONCE, span, helps)
+    if looks_back(scope, condition):  # by the heading, where the cell has none of them
+        scope.report(Code.NO_CYCLE_BEFORE, AT_ONCE, span, OF_A_VARIABLE)
         return None
     key = spelled(_plain(condition))
     known = scope.held.get(key)

@@ -1,6 +1,6 @@
 """Expressions: names found, sub-expressions typed, paths followed to their leaves."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -22,7 +22,7 @@ from rcsc.lang.expressions.operators import (
     one_kind,
     scaled,
 )
-from rcsc.lang.expressions.previous import AT_ONCE, before, cycles_of, lasting
+from rcsc.lang.expressions.previous import AT_ONCE, OF_TWO_CYCLES, before, cycles_of, lasting
 from rcsc.lang.expressions.scope import Body, Constant, Scope
 from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
@@ -415,7 +415,17 @@ _EVENTS = {
 
 
 def _event(scope: Scope, body: Body, written: tree.Event) -> Typed | None:
-    """Resolve `@T(c) when d`: `not was c and c and was d`.
+    def now() -> Typed | None:
+        changes = written.word.text == "@C"
+        return typed(scope, body, written.operand) if changes else _held(scope, body, written.operand)
+
+    return happening(scope, body, written, now)
+
+
+def happening(
+    scope: Scope, body: Body, written: tree.Event | tree.Happens, operand: Callable[[], Typed | None]
+) -> Typed | None:
+    """Resolve `@T(c) when d`: `not was c and c and was d`; `operand` resolves c.
 
     Source: Heitmeyer, Jeffords and Labaw, "Automated consistency checking of requirements specifications", ACM TOSEM 5(3), 1996: of
     the old state c does not hold and d does, of the new one c holds. `@F(c)` is `@T(not c)`, and `@C(x)` that x differs.
@@ -430,8 +440,8 @@ def _event(scope: Scope, body: Body, written: tree.Event) -> Typed | None:
         message = scope.no_before.replace("`was`", "an event")
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
         return None
-    with without_before(scope, "an event is of two cycles, and cannot be part of `was` or of another event"):
-        now = typed(scope, body, written.operand) if word == "@C" else _held(scope, body, written.operand)
+    with without_before(scope, OF_TWO_CYCLES):
+        now = operand()
         guard = None if written.guard is None else boolean(scope, body, written.guard)
     past = None if now is None else before(scope, now.expr, span)
     if now is None or past is None:

@@ -449,8 +449,11 @@ class Build:
                 return self.expr(part)
 
     def _condition(self, node: ParseNode) -> tree.Condition:
-        """Build a condition cell; `x for 2 [s]` states that the heading has been x for 2 s."""
+        """Build a condition cell; `x for 2 [s]` states that the heading has been x for 2 s, `@T(x)` that it came to be x."""
         span, parts = self._span(node), node.children
+        happening = self._happening(node)
+        if happening is not None:
+            return happening
         if node.data == "lasts":
             return tree.Lasting(self._untimed(parts[0]), self.expr(parts[-1]), span)
         if node.data == "equals" and parts[0].data == "lasts":
@@ -463,6 +466,24 @@ class Build:
             members = self._members([*parts[:-1], value])
             return tree.Lasting(tree.OneOf(members, span), self.expr(time), span)
         return self._untimed(node)
+
+    def _happening(self, node: ParseNode) -> tree.Happens | None:
+        """Build an event of the heading; None of any other cell."""
+        whole = node.children[0] if node.data == "equals" else node
+        if self._rule(whole) not in ("event", "event_when", "negate", "happens"):
+            return None
+        negated, guarded = (self._kind(whole.children, word) is not None for word in ("NOT", "WHEN"))
+        inner = whole if whole.data == "event" else whole.children[negated]
+        if self._rule(inner) not in ("event", "happening"):
+            return None
+        word, *said = inner.children
+        operand: tree.Comparison | tree.OneOf | tree.Between | None = None
+        if said and inner.data == "event":
+            operand = tree.Comparison("=", self.expr(said[0]), self._span(said[0]))
+        elif said:
+            operand = self._untimed(said[0])
+        guard = self.expr(whole.children[-1]) if guarded else None
+        return tree.Happens(self._name(word), operand, guard, self._span(node), negated)
 
     def _untimed(self, node: ParseNode) -> tree.Comparison | tree.OneOf | tree.Between:
         span, parts = self._span(node), node.children

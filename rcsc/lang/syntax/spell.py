@@ -186,6 +186,10 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
             return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
         case tree.Lasting(inner, time):
             return f"{spell_condition(inner, whole)} {_for(time)}"
+        case tree.Happens(word, operand, guard):
+            of = "" if operand is None else f"({spell_condition(operand, False)})"
+            when = "" if guard is None else f" when {spell_expr(guard, CONJUNCTION)}"
+            return f"{'not ' if condition.negated else ''}{word.text}{of}{when}"
         case tree.OneOf(members, negated=False) if len(members) > 1 and any(map(_in_groups, members)):
             return ", ".join(map(_listed, members))
         case tree.OneOf(members):
@@ -208,8 +212,9 @@ def _listed(member: tree.Member) -> str:
 
 
 def _plain(value: tree.Expr) -> bool:
-    """Return whether `value` alone cannot be taken for DEFAULT, nor for a condition that has held for a time."""
-    return not (isinstance(value, tree.Lasts) or _is_default(value))
+    """Return whether `value` alone cannot be taken for DEFAULT, nor for a condition that has held for a time, or an event."""
+    denied = value.operand if isinstance(value, tree.Unary) and value.op == "not" else value
+    return not (isinstance(value, tree.Lasts) or isinstance(denied, tree.Event) or _is_default(value))
 
 
 def _is_default(value: tree.Expr) -> bool:

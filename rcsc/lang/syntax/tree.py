@@ -453,7 +453,24 @@ class Lasting:
     span: Span = at()
 
 
-Condition: TypeAlias = Comparison | OneOf | Between | Lasting
+@dataclass(frozen=True, slots=True)
+class Happens:
+    """A condition cell `@T(> 3)`, `@F when b` or `not @C`: the heading came to be so, ceased to be, or changed.
+
+    Attributes:
+        word: As of an `Event`.
+        operand: What the heading came to be; None where the word stands alone: a heading that is true or false.
+        guard: What held before it.
+    """
+
+    word: Name
+    operand: Comparison | OneOf | Between | None = None
+    guard: Expr | None = None
+    span: Span = at()
+    negated: bool = False
+
+
+Condition: TypeAlias = Comparison | OneOf | Between | Lasting | Happens
 
 
 @dataclass(frozen=True, slots=True)
@@ -848,6 +865,10 @@ def term(heading: Heading, cell: Condition) -> Expr:
             return Binary(op, heading.subject, value)
         case Lasting(condition, time):
             return Lasts(term(heading, condition), time)
+        case Happens(word, operand, guard, span):
+            of = heading.subject if operand is None else term(heading, operand)
+            happens = Event(word, of, guard, span)
+            return Unary("not", happens, span) if cell.negated else happens
         case OneOf(members):
             return InSet(heading.subject, members, negated=cell.negated)
         case Between(low, high):

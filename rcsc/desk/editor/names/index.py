@@ -241,6 +241,9 @@ class _Walk:
             case tree.Lasting(condition, time):
                 yield from self.condition(condition)
                 yield from self.expr(time)
+            case tree.Happens(_, operand, guard):
+                yield from () if operand is None else self.condition(operand)
+                yield from () if guard is None else self.expr(guard)
 
     def joined(self, value: tree.Expr, places: list[tuple[int, int]]) -> Iterator[Occurrence]:
         """Yield the names of conditions joined by `and`: each was parsed by itself where there are places."""
