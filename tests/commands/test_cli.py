@@ -777,6 +777,20 @@ def test_new_makes_a_project_that_checks_compiles_and_is_formatted(rcsc: Rcsc) -
     assert "not empty" in ran.out
 
 
+def test_new_begins_in_a_fresh_repository(rcsc: Rcsc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = tmp_path / "cart"
+    (here / ".git").mkdir(parents=True)
+    (here / "README.md").write_text("a cart\n", encoding="utf-8")
+    (here / "LICENSE").touch()
+    monkeypatch.chdir(here)
+    ran = rcsc("new", ".", "--template", "system")
+    assert (ran.status, (here / "README.md").read_text(encoding="utf-8")) == (0, "a cart\n")
+    assert "in ., and kept README.md; now: rcsc check && " in ran.out + ran.err
+    assert rcsc("check").status == 0
+    again = rcsc("new", ".")
+    assert (again.status, "not empty, it has `axis.rcs`" in again.out) == (1, True)
+
+
 def test_help_teaches(rcsc: Rcsc) -> None:
     assert "Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc." in rcsc("--help").out
     for name in commands.group.commands.commands:

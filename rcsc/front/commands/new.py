@@ -3,6 +3,7 @@
 A template is a folder of files in `templates`: `dot_NAME` becomes `.NAME`, and `ROBOT_NAME` in a text the project's name.
 """
 
+import os
 import re
 import shlex
 from collections.abc import Iterator
@@ -29,6 +30,8 @@ NEXT = {
 }
 """Each template, and what to type first."""
 CACHES = {".rcsc-cache", "__pycache__"}
+BEGUN = re.compile(r"\..+|(README|LICEN[CS]E|COPYING)(\..+)?", re.IGNORECASE)
+"""What a repository may have before there is a project in it; what a template has, too, stays as it is."""
 GUIDE = ".md"
 """The guides beside the paper's tables speak of the repository."""
 GALLERY = "gallery/"
@@ -40,7 +43,7 @@ GALLERY = "gallery/"
     epilog="""\b
 Examples:
   rcsc new gripper && cd gripper && rcsc check    one level: a table of seven lines
-  rcsc new cart --template system                 two levels, plant, script, tests, hooks, CI
+  rcsc new . --template system                    two levels, plant, script, tests, hooks, CI; here
   rcsc new robot --template mujoco                a robot that docks by contact, in MuJoCo
   rcsc new nbs --example nbs                      the paper's system, with its cell""",
 )
@@ -51,34 +54,45 @@ Examples:
               help="A whole system to read and run, in place of a template: nbs, the paper's.")  # fmt: skip
 @showing
 def command(folder: Path, template: str | None, example: str | None, output: Output) -> int:
-    """Make a project in DIR, new or empty, that checks, proves, compiles and passes its tests."""
+    """Make a project in DIR that checks, proves, compiles and passes its tests.
+
+    DIR is new or empty, or a fresh repository: its README, licence and hidden files stay as they are.
+    """
     if template is not None and example is not None:
         raise click.UsageError("--template and --example do not go together")
     kind = example or template or "level"
     scaffold = _scaffold(folder, kind)
     if not isinstance(scaffold, tuple):
         return finish(Report((scaffold,)), "new", output)
+    made, kept = scaffold
     place = shlex.quote(f"./{folder}" if str(folder).startswith("-") else str(folder))
-    closing = f"made {len(scaffold)} files in {folder}; now: cd {place} && {NEXT[kind]}"
+    there = "" if folder.resolve() == Path.cwd() else f"cd {place} && "
+    stays = f", and kept {', '.join(kept)}" if kept else ""
+    closing = f"made {len(made)} files in {folder}{stays}; now: {there}{NEXT[kind]}"
     return finish(Report(()), "new", output, closing)
 
 
-def _scaffold(folder: Path, kind: str) -> tuple[Path, ...] | Diagnostic:
-    """Make the project in `folder`, new or empty; return the files written, or the reason why there are none."""
+def _scaffold(folder: Path, kind: str) -> tuple[list[str], list[str]] | Diagnostic:
+    """Make the project in `folder`; return the files written and those that were there, or the reason why there are none."""
     name = re.sub(r"\W", "_", folder.resolve().name, flags=re.ASCII) or "robot"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            return _refused(folder, "the folder is not empty")
-        written = []
+        others = sorted(entry.name for entry in folder.iterdir() if not BEGUN.fullmatch(entry.name))
+        if others:
+            return _refused(folder, f"the folder is not empty, it has `{others[0]}`")
+        written: list[str] = []
+        kept: list[str] = []
         for file, content in _files(kind):
             path = folder / file
+            if os.path.lexists(path):
+                kept.append(file)
+                continue
             path.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path, content.replace(NAME.encode(), name.encode()))
-            written.append(path)
+            written.append(file)
     except OSError as error:
         return _refused(folder, error.strerror or type(error).__name__)
-    return tuple(written)
+    return written, kept
 
 
 def _files(kind: str) -> Iterator[tuple[str, bytes]]:
