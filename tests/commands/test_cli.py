@@ -777,7 +777,9 @@ def test_new_makes_a_project_that_checks_compiles_and_is_formatted(rcsc: Rcsc) -
     assert "not empty" in ran.out
 
 
-def test_new_begins_in_a_fresh_repository(rcsc: Rcsc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_new_begins_in_a_fresh_repository(
+    rcsc: Rcsc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     here = tmp_path / "cart"
     (here / ".git").mkdir(parents=True)
     (here / "README.md").write_text("a cart\n", encoding="utf-8")

@@ -26,7 +26,10 @@ LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
 GUARD = re.compile(r"\(?s->fault [!=]= \w+\)?$")
 NO_LINE = re.compile(r"\(?(m|seen) == 0|case \(-1\)")
 SEVERAL_LINES = re.compile(r"several$|\(?several != 0|default$")
-MACHINE = "no way in which a machine can be told to round makes it so: four were played"
+MACHINE = (
+    "out of reach in this build, each way of rounding was played; it guards against a compiler that contracts or keeps more digits,"
+    " as `clang -mfma -ffp-contract=fast` does"
+)
 ADMITTED = "no input of this program can be refused"
 UNENDED = "no table before the last can be without its one line"
 ENDS = {Fault.NO_LINE: NONE, Fault.SEVERAL_LINES: SEVERAL}
