@@ -3,7 +3,8 @@
 `pytest -m quick` runs some of every room, in less than a minute of two idle cores. They are whole files, the least costly first; of a room
 that has no such file, the least costly tests of one: to read a file costs as much as a hundred such tests. `pytest -m thorough` runs what
 takes long. Of every file the ordinary run, `pytest` alone, has the least costly cases, up to `MOST_OF_A_FILE_S`, and what is `KEPT`. The
-rest is thorough, and runs where its folder, file or name is asked for. `pytest -m "thorough or not thorough" --junitxml=JUNIT` runs all.
+rest is thorough, and runs where its folder, file or name is asked for. `pytest -m "thorough or not thorough" --junitxml=JUNIT` runs all; of
+the record of an ordinary run what is thorough stays so, and more may become it.
 
 The lists are `quick.txt` and `thorough.txt`; `conftest.py` gives each test on them its mark, and reads no other file where quick tests
 alone are asked for.
@@ -122,7 +123,16 @@ def by_function(took_s: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
-if __name__ == "__main__":
-    of_cases = measured(Path(sys.argv[1]))
-    for path, names in ((QUICK, choose(by_function(of_cases))), (THOROUGH, choose_thorough(of_cases))):
+def main(junit: Path) -> None:
+    """Write the lists anew."""
+    of_cases = measured(junit)
+    left_out = {name for name in chosen(THOROUGH) if name not in of_cases}
+    lists = {THOROUGH: sorted({*choose_thorough(of_cases), *left_out})}
+    if not left_out:
+        lists[QUICK] = choose(by_function(of_cases))
+    for path, names in lists.items():
         path.write_text("".join(f"{name}\n" for name in names), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
