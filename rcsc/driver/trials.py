@@ -227,7 +227,7 @@ def proofs(options: Options) -> Proofs:
     """Return the prover and its solver, as far as the suite needs them."""
 
     def prover(program: Program, table: Table) -> Opinion:
-        verdict = prove_table(program, table, options)
+        verdict = prove_table(program, table, replace(options, brief=True))
         falls = [finding for finding in verdict.findings if isinstance(finding, Gap)]
         accepted = len(falls) == len(verdict.findings) and (not falls or not must_cover(table))
         return Opinion(accepted, repr([(gap.count, gap.witnesses) for gap in falls]))

@@ -1022,8 +1022,9 @@ class Backing:
     """The grounds of a verdict, shown in the report.
 
     Attributes:
-        method: `boxes` (masks and counting), `tree` (region tree) or `z3`.
-        confirmed_by_z3: Whether Z3 was asked the same and agreed.
+        method: `boxes` (masks and counting), `tree` (region tree), `tree+z3` (Z3 answered for some of its regions), `z3` (Z3 alone)
+            or `none`.
+        confirmed_by_z3: Whether Z3 was asked the same as a whole, and agreed.
         assumptions: Each assumption used, with its standing.
     """
 

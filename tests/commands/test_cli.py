@@ -92,7 +92,7 @@ def test_0_proved_and_the_report_says_what_backs_it(rcsc: Rcsc) -> None:
     write("grip.rcs")
     ran = rcsc("check")
     assert (ran.status, ran.err) == (0, "")
-    assert ran.out.startswith("grip.rcs\n  grip  proved     2 lines, by boxes, confirmed by Z3, ")
+    assert ran.out.startswith("grip.rcs\n  grip  proved     2 lines, decided by counting, confirmed by Z3, ")
     assert ran.out.endswith("1 table: 1 proved, 0 refuted, 0 undecided; 0 errors, 0 warnings, 0 notes\n")
 
 

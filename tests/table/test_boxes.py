@@ -17,6 +17,7 @@ from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import furthest, halved
 from rcsc.proof.table import boxes
+from rcsc.proof.table import confirm as confirming
 from rcsc.proof.table.confirm import Agreement, confirm
 from rcsc.proof.table.decide import prove_table
 from rcsc.proof.table.diagnose import diagnostics
@@ -445,18 +446,27 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
     assert Code.SOLVERS_DISAGREE in {finding.code for finding in verdict.findings}
 
 
-@pytest.mark.parametrize(("solver", "spare", "asked"), [
-    ("boxes", 0, False), ("auto", 0, True), ("auto", -1, False), ("both", 0, True), ("both", -1, True),
+STATED = 2 * confirming._OF_A_CELL
+"""What it costs to put the two conditions of these tables into Z3's words."""
+
+
+@pytest.mark.parametrize(("options", "small", "budget", "agreed"), [
+    (Options(solver="boxes"), 4, STATED, Agreement.NOT_ASKED), (Options(solver="z3"), 4, STATED, Agreement.NOT_ASKED),
+    (Options(), 4, 0, Agreement.AGREES), (Options(), 3, STATED + 10_000, Agreement.AGREES),
+    (Options(), 3, STATED + 1, Agreement.UNKNOWN), (Options(), 3, STATED, Agreement.NOT_ASKED),
+    (Options(brief=True), 3, STATED + 10_000, Agreement.NOT_ASKED), (Options(brief=True), 4, 0, Agreement.AGREES),
+    (Options(solver="both"), 3, 0, Agreement.AGREES),
 ])  # fmt: skip
 def test_z3_is_asked_as_the_options_say(
-    monkeypatch: pytest.MonkeyPatch, solver: Literal["auto", "both", "boxes"], spare: int, asked: bool
+    monkeypatch: pytest.MonkeyPatch, options: Options, small: int, budget: int, agreed: Agreement
 ) -> None:
+    """Of a table of more than so many lines times cells (here two times two), within a budget of steps."""
     program = ANSWERED["right"]
-    monkeypatch.setattr("rcsc.proof.table.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
-    options = Options(solver=solver)
-    agreed = confirm(program, program.tables[0], (), options)
-    assert agreed is (Agreement.AGREES if asked else Agreement.NOT_ASKED)
-    assert prove_table(program, program.tables[0], options).backing.confirmed_by_z3 == asked
+    monkeypatch.setattr(confirming, "_SMALL", small)
+    monkeypatch.setattr(confirming, "_OF_A_LARGE_TABLE", budget)
+    assert confirm(program, program.tables[0], (), options) is agreed
+    verdict = prove_table(program, program.tables[0], options)
+    assert (verdict.findings, verdict.backing.confirmed_by_z3) == ((), agreed is Agreement.AGREES)
     undecided = confirm(program, program.tables[0], (Undecided("too large"),), options)
     assert undecided is Agreement.NOT_ASKED
 

@@ -1,9 +1,10 @@
 """What a verdict on a table claims: the worst of all programs that it is in, and what it rests on."""
 
 import json
+from dataclasses import replace
 from itertools import combinations, permutations, product
 from pathlib import Path
-from typing import Literal
+from random import Random
 
 import pytest
 from hypothesis import given, settings
@@ -18,15 +19,28 @@ from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, Value
+from rcsc.lang.resolve import compile_text
+from rcsc.proof.certify import certify
 from rcsc.proof.solvers import smt
-from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.options import STEPS, Options, SolverChoice
 from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.solvers.smtlib import cvc5_says
 from rcsc.proof.table.confirm import TableSolver
 from rcsc.proof.table.program import prove_program
-from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
-from tests.support.programs.stages import drawn_program, program_of, reported, verdict_of
+from rcsc.proof.table.verdict import (
+    ContradictoryAssumptions,
+    DeadLine,
+    Gap,
+    Overlap,
+    SolversDisagree,
+    TableVerdict,
+    Undecided,
+)
+from tests.support.programs.stages import drawn_program, program_of, reported, shipped, verdict_of
 from tests.support.programs.texts import table
+from tests.wrong import drawn
 
+REPO = Path(__file__).parents[2]
 HERE = {
     "lib": "state a : int 0 .. 9\ninput g : bool\ntable t {\n  | line | a ||\n  | l | <= 4 ||\n  | h | 5 .. 8 ||\n}\n",
     "plain": "use lib\ntable ta {\n  | line | g ||\n  | l | true ||\n  | h | false ||\n}\n",
@@ -188,6 +202,19 @@ def brute(program: Program) -> set[object]:
     return found | ({"gap"} if [] in matched else set())
 
 
+def least(program: Program) -> dict[object, dict[str, Value]]:
+    """The least input, in declared order, of each overlap and of the gap, by trying every input."""
+    [table] = program.tables
+    found: dict[object, dict[str, Value]] = {}
+    for values in product(*RANGES.values()):
+        here = dict(zip(RANGES, values, strict=True))
+        if all(holds(a.condition, here) for a in program.assumptions):
+            matched = matching_lines(table, here)
+            for wrong in (*combinations(matched, 2), *(() if matched else ("gap",))):
+                found.setdefault(wrong, here)
+    return found
+
+
 def told(program: Program, options: Options) -> tuple[set[object], list[object], set[tuple[Code, str]]]:
     """The same from a verdict: with the witnesses of gaps, and what is said of it."""
     verdict = prove_program(program, options)
@@ -224,10 +251,166 @@ def test_every_way_of_deciding_finds_what_trying_all_inputs_finds(text: str) -> 
     default = program.tables[0].default
     dead = default is not None and not default.unreachable and not {"gap", "contradiction"} & by_boxes[0]
     assert any(code is Code.DEFAULT_DEAD for code, _ in by_boxes[2]) == dead
+    alone = told(program, ALONE)
+    assert alone[0] == by_boxes[0]
+    assert {code for code, _ in alone[2]} == {code for code, _ in by_boxes[2]}
 
 
-@pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
-def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both"]) -> None:
+ALONE = Options(solver="z3")
+
+
+@given(tables())
+@settings(max_examples=25, deadline=None)
+def test_z3_alone_gives_the_least_inputs_and_rests_on_no_more_than_it_needs(text: str) -> None:
+    program = drawn_program(text)
+    verdict = prove_program(program, ALONE)
+    [alone] = verdict.tables
+    assert alone.backing.method == "z3"
+    names = [line.name for line in alone.table.lines]
+    wanted = least(program)
+    for wrong in alone.findings:
+        if isinstance(wrong, Overlap):
+            assert wrong.witness.items() <= wanted[names[wrong.first], names[wrong.second]].items()
+        elif isinstance(wrong, Gap):
+            [witness] = wrong.witnesses
+            assert witness.items() <= wanted["gap"].items()
+    used = tuple(name for name, _ in alone.backing.assumptions)
+    by_boxes = prove_program(program, Options(solver="boxes")).tables[0]
+    assert set(used) <= {name for name, _ in by_boxes.backing.assumptions}
+    if verdict.proved is not None:
+        [table] = program.tables
+        fewer = replace(program, assumptions=tuple(a for a in program.assumptions if a.name in used))
+        default = table.default is not None and not table.default.unreachable
+        assert not {
+            each for each in brute(fewer) if isinstance(each, tuple) or (each == "gap" and not default)
+        }
+        assert verdict.certificate is not None
+        assert not certify(program, verdict.certificate).problems
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_z3_alone_says_of_any_table_what_the_others_say(seed: int) -> None:
+    """Of numbers of 64 bits, doubles, singles, words, enumerations, arrays, sets, `above` and `same`, under assumptions or not."""
+    program = compile_text(drawn(Random(f"alone {seed}"), small=True))  # noqa: S311  # a sample, not a secret
+    if isinstance(program, Program):
+        assert_alike(program, 100_000)
+
+
+CORPUS = (
+    "tables/examples/acquire_published.rcs",
+    "tables/examples/grip.rcs",
+    "tables/task/acquire.rcs",
+    "tables/emove/move_to.rcs",
+    "tables/gripper/gripper.rcs",
+    "tables/gallery/cia402",
+    "tables/gallery/tcas",
+    "tables/gallery/safety_injection",
+)
+
+
+@pytest.mark.parametrize("path", CORPUS)
+def test_z3_alone_says_of_shipped_tables_what_the_others_say(path: str) -> None:
+    files = sorted((REPO / path).glob("*.rcs")) if (REPO / path).is_dir() else [REPO / path]
+    programs = [shipped(str(file.relative_to(REPO)), REPO) for file in files]
+    assert any(program.tables for program in programs)
+    for program in programs:
+        assert_alike(program)
+
+
+def assert_alike(program: Program, steps: int = STEPS) -> None:
+    """Assert that boxes, both and Z3 alone find the same, as far as each decides."""
+    ways = {
+        how: prove_program(program, Options(solver=how, steps=steps)).tables
+        for how in ("boxes", "both", "z3")
+    }
+    for one, both, alone in zip(*ways.values(), strict=True):
+        names = [line.name for line in one.table.lines]
+        if one.undecided or both.undecided or alone.undecided:
+            assert {verdict.refuted for verdict in (one, both, alone) if not verdict.undecided} != {
+                True,
+                False,
+            }
+            for verdict in (one, alone):
+                assert verdict.certificate is None or not verdict.undecided
+            continue
+        kinds, rest = map(list, zip(*(_said(verdict) for verdict in (one, both, alone)), strict=True))
+        assert kinds[0] == kinds[1] == kinds[2], names
+        if one.backing.method in {"boxes", "tree"}:  # else its least inputs are those found within few steps
+            assert rest[0] == rest[1] == rest[2], names
+            assert one.backing.assumptions == alone.backing.assumptions
+
+
+def _said(verdict: TableVerdict) -> tuple[set[object], dict[object, object]]:
+    """What is wrong, and what is said of it: the least input, or that a line is dead under assumptions alone."""
+    found: dict[object, object] = {}
+    for each in verdict.findings:
+        match each:
+            case Overlap(first, second, witness):
+                found["overlap", first, second] = dict(witness)
+            case DeadLine(line, assuming):
+                found["dead", line] = assuming
+            case Gap(witnesses):
+                read = verdict.table.variables
+                found["gap"] = {name: value for name, value in witnesses[0].items() if name in read}
+            case _:
+                found[each] = None
+    return set(found), found
+
+
+@pytest.mark.parametrize("text", [
+    table("t", "line | a ||", "l | <= 4 ||", "m | > 4 ||"),
+    table("t", "line | a ||", "l | <= 4 ||", "m | > 4 ||", "d | DEFAULT ||"),
+    table("t", "line | a ||", "l | <= 4 ||", "m | >= 4 ||", "n | > 9 ||"),
+    table("t", "line | a ||", "l | < 4 ||", "m | > 4 ||", assuming="low"),
+], ids=["right", "default", "overlap", "assuming"])  # fmt: skip
+def test_what_z3_alone_does_not_answer_is_undecided(text: str) -> None:
+    verdict = verdict_of(f"input a : int 0 .. 12\nassume low : a /= 4\n{text}", Options(solver="z3", steps=1))
+    [alone] = verdict.tables
+    assert {type(each) for each in alone.findings} == {Undecided}
+    assert verdict.proved is None
+    assert alone.certificate is None
+    assert {each.code for each in verdict.findings if each.severity is Severity.ERROR} == {Code.UNDECIDED}
+
+
+WRONG = "input a : int 0 .. 9\n" + table("t", "line | a ||", "l | <= 4 ||", "m | 4 .. 6 ||", "n | > 7 ||")
+
+
+@pytest.mark.parametrize("elsewhere", [0, 4, 7, 10], ids=["a line", "an overlap", "a gap", "out of range"])
+def test_an_input_of_z3_that_is_none_is_never_shown(monkeypatch: pytest.MonkeyPatch, elsewhere: int) -> None:
+    """The interpreter tries it first; as Z3 gives it the wrong input each time, something it says is not so."""
+    monkeypatch.setattr("rcsc.proof.solvers.smt.Solver.value", lambda *_: elsewhere)
+    verdict = verdict_of(WRONG, ALONE)
+    assert [each.code for each in verdict.findings] == [Code.SOLVERS_DISAGREE]
+    assert verdict.tables[0].findings == (
+        SolversDisagree("the interpreter does not see what it says of an input"),
+    )
+
+
+def test_the_checker_counts_what_z3_alone_decided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Boxes it counts; of another table it is left the whole question, or, of one with many lines, a tree."""
+    head = "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
+    boxes = head + table("t", "line | x | y ||", "l | <= 4 | ||", "m | > 4 | < 3 ||", "n | > 4 | >= 3 ||")
+    far = head.replace("9", "99999")
+    across = far + table(
+        "t",
+        "line | when ||",
+        "l | x + y < 7 ||",
+        "m | x + y >= 7 and x < y ||",
+        "n | x + y >= 7 and x >= y ||",
+    )
+    for most, text, left in ((64, boxes, 0), (64, across, 1), (1, across, 0)):
+        monkeypatch.setattr("rcsc.proof.table.relational.MOST_CANDIDATES", most)
+        program = program_of(text)
+        verdict = prove_program(program, ALONE)
+        assert verdict.certificate is not None
+        outcome = certify(program, verdict.certificate)
+        assert (outcome.problems, len(outcome.unchecked)) == ((), left)
+        for each in outcome.unchecked:
+            assert cvc5_says(each.question) in {"unsat", ""}  # without cvc5 there is no answer
+
+
+@pytest.mark.parametrize("solver", ["boxes", "auto", "both", "z3"])
+def test_what_an_assumption_kills_is_told(solver: SolverChoice) -> None:
     """Boxes prove both tables without the assumption, under which a line, and DEFAULT, are dead."""
     head = "input v : bool\nassume up assumed : v\n"
     for last, code in (("m | false ||", Code.DEAD_LINE), ("d | DEFAULT ||", Code.DEFAULT_DEAD)):
@@ -238,8 +421,8 @@ def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both
         assert found.severity is Severity.WARNING  # where the assumption fails it may match
 
 
-@pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
-def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "auto", "both"]) -> None:
+@pytest.mark.parametrize("solver", ["boxes", "auto", "both", "z3"])
+def test_a_line_that_an_invariant_kills_is_a_mistake(solver: SolverChoice) -> None:
     head = "state v : bool = true\ninput w : bool\ninvariant up : v\nassume w_up assumed : w\n"
     text = head + table("t", "line | v ||", "l | true ||", "m | false ||", assuming="w_up")
     found = verdict_of(text, Options(solver=solver)).findings

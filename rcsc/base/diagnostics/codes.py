@@ -1833,9 +1833,9 @@ class Code(StrEnum):
     """
     SOLVERS_DISAGREE = """RCS901: two deciders disagree
 
-    The fast decision by boxes or regions and the solver gave different answers on the same question, or cvc5 did not confirm what `rcsc
-    prove --certify` put to it. One of them is wrong, or gave up, so nothing is proved, and it is a bug in rcsc. Please report it with
-    the table.
+    The fast decision by boxes or regions and the solver gave different answers on the same question; or, with `--solver z3`, the
+    interpreter did not see what Z3 said of an input; or cvc5 did not confirm what `rcsc prove --certify` put to it. One of them is wrong,
+    or gave up, so nothing is proved, and it is a bug in rcsc. Please report it with the table.
     """
     INTERNAL = """RCS902: a bug in rcsc
 

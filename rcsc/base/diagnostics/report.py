@@ -68,8 +68,8 @@ class TableReport:
         table: Its name.
         file: Where it stands.
         lines: The number of its lines, DEFAULT not counted.
-        method: `boxes`, `tree` or `z3`; empty where nothing was decided.
-        confirmed_by_z3: Whether Z3 was asked the same and agreed.
+        method: The way it was decided, as in `DECIDERS`; empty or `none` where nothing was decided.
+        confirmed_by_z3: Whether Z3 was asked the same as a whole, and agreed.
         assumptions: Each assumption and invariant that the proof used, and its standing.
         proof_ms: The duration of the proof when it was made.
         cached: Whether it was made by an earlier run.
@@ -91,7 +91,34 @@ class TableReport:
     stops: tuple[str, ...] = ()
     tells: tuple[str, ...] = ()
 
+    @property
+    def decided_by(self) -> str:
+        """Who decided it, in words; "" where it is undecided."""
+        return "" if self.verdict is Verdict.UNDECIDED else DECIDERS.get(self.method, "")
 
+    @property
+    def confirmed_by(self) -> str:
+        """Who was asked the same as a whole, and agreed; "" where nobody was."""
+        return "Z3" if self.confirmed_by_z3 else ""
+
+    @property
+    def backed(self) -> str:
+        """Who decided it and who confirmed it: `decided by counting, confirmed by Z3`."""
+        if self.verdict is Verdict.UNDECIDED:
+            return (
+                f"left open by {DECIDERS[self.method]}" if self.method in DECIDERS else "decided by nothing"
+            )
+        confirmed = f", confirmed by {self.confirmed_by}" if self.confirmed_by else ""
+        return f"decided by {self.decided_by}{confirmed}"
+
+
+DECIDERS = {
+    "boxes": "counting",
+    "tree": "a tree of regions",
+    "tree+z3": "a tree of regions and Z3",
+    "z3": "Z3",
+}
+"""Ways of deciding a table, each by its deciders."""
 MOST_NAMED = 3
 """Claims named of those that a verdict rests on; the others are counted."""
 

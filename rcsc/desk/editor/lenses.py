@@ -72,8 +72,7 @@ def proved_anew(reading: Reading, name: str, options: Options) -> Shown:
     rests = [f"rests on `{assumption}` ({was})" for assumption, was in report.assumptions]
     lines = [
         f"table `{name}`: {told}",
-        f"{report.lines} lines, decided by {report.method or 'nothing'}"
-        + (", confirmed by Z3" if report.confirmed_by_z3 else ""),
+        f"{report.lines} lines, {report.backed}",
         *rests,
         *(f"the executors end the cycle where `{stop}` fails" for stop in report.stops),
         *(each.message for each in verdict.findings if each.severity != "error"),

@@ -1,8 +1,10 @@
 """How a proof is to be made."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
+SolverChoice: TypeAlias = Literal["auto", "both", "boxes", "z3"]
+"""The part that Z3 plays in deciding tables."""
 STEPS = 20_000_000
 """Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
 TOGETHER = 20
@@ -43,8 +45,8 @@ class Options:
         steps: Budget of each solver query, and, `TOGETHER` times, of all queries about a table or a procedure; past it the verdict
             is *undecided*, never *proved*.
         memory_mb: For the solver.
-        solver: `auto` lets Z3 confirm every table that should cost it little, `both` every
-            table, `boxes` none (procedures are still Z3's).
+        solver: `auto` lets Z3 confirm every table within a budget, and `both` every table, or it is undecided; of `boxes` none
+            (procedures are still Z3's). With `z3` nothing else decides a table.
         jobs: Processes that prove tables.
         cpu_s: The backstop of a question, in seconds; 0 for one that the steps do not need.
         brief: Whether repairs of findings, and whether overlapping lines do the same, are left for later.
@@ -54,7 +56,7 @@ class Options:
 
     steps: int = STEPS
     memory_mb: int = 4_096
-    solver: Literal["auto", "both", "boxes"] = "auto"
+    solver: SolverChoice = "auto"
     jobs: int = 1
     cpu_s: float = 0.0
     brief: bool = False

@@ -25,7 +25,7 @@ A word whose bits are looked at one by one is as many axes (`regions.word_bits`)
 
 Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,
 without `rcsc certify`: `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
-every table that is cheap enough, and a disagreement is a bug in rcsc.
+what it can within a budget, and a disagreement is a bug in rcsc. With `Options(solver="z3")` Z3 alone decides (`confirm`).
 
 Two searches find a least witness. For boxes `regions.partition` counts, which tells the first slice with a gap without a
 question; everywhere else a solver or a simplex is asked, and `rcsc.proof.solvers.search` bisects with few questions.
@@ -34,7 +34,7 @@ What it costs: pairs of lines and slices of keys for boxes, a budget in steps fo
 undecided, and fails.
 
 Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
-`confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.proof.certify`
+`confirm` (Z3, to confirm or alone), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.proof.certify`
 checks anew), `cells` (keys as cells), `repair` (proved before shown), `findings` (which to tell), `diagnose`,
 `mending` (what is proposed, tried in the text).
 """

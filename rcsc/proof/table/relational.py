@@ -16,7 +16,6 @@ from random import Random
 from rcsc.lang.interpret import UNDEFINED, fold
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
-    AssumptionName,
     Expr,
     Program,
     Read,
@@ -44,6 +43,7 @@ from rcsc.proof.table.regions.splitting import Tree
 from rcsc.proof.table.verdict import (
     ContradictoryAssumptions,
     DeadLine,
+    Decided,
     Gap,
     Overlap,
     Region,
@@ -52,7 +52,7 @@ from rcsc.proof.table.verdict import (
     settles,
 )
 
-_MOST_CANDIDATES = 64
+MOST_CANDIDATES = 64
 """Lines in one question to the solver: it states every pair of them."""
 _MOST_GROWN = 20
 """Findings of one table that are given the region around them."""
@@ -78,15 +78,6 @@ _OF_A_LINE = 10
 """Whether a line can match may take this part of a question's steps: about a second over doubles, of which Z3 may take all and not know."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
-
-
-@dataclass(frozen=True, slots=True)
-class Decided:
-    """Findings, the certificate of a table without any, and the assumptions needed."""
-
-    findings: tuple[TableFinding, ...]
-    certificate: Mapping[str, object] | None
-    used: tuple[AssumptionName, ...]
 
 
 class _OverError(Exception):
@@ -239,11 +230,16 @@ class _Decision:
             self._asked = TableSolver(self.program, self.table, self.options)
         return self._asked
 
+    @property
+    def by_solver(self) -> bool:
+        """Whether Z3 was asked."""
+        return self._asked is not None and self._asked.solver.queries > 0
+
     def decided(self) -> Decided:
         """Decide and certify the table."""
         wrong = self.contradiction()
         if wrong:
-            return Decided(wrong, None, ())
+            return Decided(wrong, (), by_solver=self.by_solver)
         kept = tuple(range(len(self.assumptions)))
         search = self.search(kept)
         if search.proved:
@@ -261,7 +257,8 @@ class _Decision:
         certificate = (
             tree_certificate(self.table, self.universe, search.nodes, names) if search.proved else None
         )
-        return Decided(findings, certificate, names if search.proved else self.table.assumptions)
+        used = names if search.proved else self.table.assumptions
+        return Decided(findings, used, certificate, self.by_solver)
 
     def under_assumptions(self, settled: tuple[TableFinding, ...]) -> tuple[TableFinding, ...]:
         """Return dead lines, and a gap that DEFAULT takes, under the assumptions."""
@@ -334,7 +331,7 @@ class _Decision:
 
     def oracle(self, asked: Question) -> Snapshot | NoWitness:
         """Answer the tree's question about a region: by the samples, else by Z3."""
-        if len(asked.candidates) > _MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
+        if len(asked.candidates) > MOST_CANDIDATES or smt.spent() or (self.few and self.rest.spent):
             return NoWitness.UNKNOWN
         fewest = 1 if must_cover(self.table) else 0
         self.few = self.few or self.refuted_by_trial
@@ -353,7 +350,7 @@ class _Decision:
         )
         if answer is Answer.SATISFIABLE:
             self.few = True
-            return self.model(z3)
+            return z3.model()
         return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
     def fault(self, candidates: Sequence[int]) -> Term:
@@ -368,12 +365,6 @@ class _Decision:
         """Ask Z3 whether the terms can hold; once something is wrong, only within the rest of the budget."""
         with smt.within(self.rest) if self.few else nullcontext():
             return self.asked.holds(*terms)
-
-    def model(self, z3: TableSolver) -> dict[str, Value]:
-        """Return the solver's input: the values of the variables that the table and its assumptions read."""
-        leaves = z3.frame.leaves
-        asked = (v for v in self.program.variables if v.name in leaves)
-        return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in asked}
 
     def spelled(self, asked: Question) -> list[tuple[list[tuple[Expr, int]], int, int]]:
         """Return the bounds of a region, their forms as sums of terms."""
@@ -428,7 +419,7 @@ class _Decision:
         while left and len(found) < _MOST_DOUBTFUL and not smt.spent():
             if z3.holds(*region, smt.any_of(list(left.values()))) is not Answer.SATISFIABLE:
                 break
-            new = left.keys() & set(combinations(self.seen(self.model(z3)), 2))
+            new = left.keys() & set(combinations(self.seen(z3.model()), 2))
             if not new:
                 break
             found |= new

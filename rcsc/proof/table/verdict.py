@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc.lang.model import Backing, Box, Snapshot, Table
+from rcsc.lang.model import AssumptionName, Backing, Box, Snapshot, Table
 
 Witness: TypeAlias = Snapshot
 """A value for every test variable of the table."""
@@ -75,6 +75,22 @@ class SolversDisagree:
 
 
 TableFinding: TypeAlias = Overlap | Gap | DeadLine | ContradictoryAssumptions | Undecided | SolversDisagree
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """What one way of deciding says of a table.
+
+    Attributes:
+        used: The assumptions that the proof needs; all of them where there is none.
+        certificate: Of a table in order, where this way makes one.
+        by_solver: Whether Z3 answered a part of it.
+    """
+
+    findings: tuple[TableFinding, ...]
+    used: tuple[AssumptionName, ...]
+    certificate: Mapping[str, object] | None = None
+    by_solver: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,9 +26,7 @@ def table_proofs(reports: Iterable[TableReport]) -> dict[str, TableProof]:
 
 
 def _method(table: TableReport) -> str:
-    how = {"boxes": "by boxes", "tree": "by a tree of regions", "z3": "by Z3"}.get(table.method, table.method)
-    agreed = ", confirmed by Z3" if table.confirmed_by_z3 and table.method != "z3" else ""
-    return f"exactly one of {table.lines} lines matches, {how}{agreed}"
+    return f"exactly one of {table.lines} lines matches, {table.backed}"
 
 
 def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, get_args
 
 import click
 
@@ -12,7 +12,7 @@ from rcsc.base.host.files.read import standard_input
 from rcsc.driver.settings import Settings
 from rcsc.front.commands.shared.show import Color, Output, OutputForm, Progress
 from rcsc.lang.project import MOST_BYTES
-from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.options import Options, SolverChoice
 
 Command = Callable[..., int]
 
@@ -62,11 +62,11 @@ def proving(command: Command) -> Command:
     )
     @click.option(
         "--solver",
-        type=click.Choice(["auto", "both", "boxes"]),
+        type=click.Choice(get_args(SolverChoice)),
         default="auto",
         show_default=True,
-        help="auto: boxes and regions, confirmed by Z3 where that is quick. both: confirmed by Z3 always. "
-        "boxes: Z3 only for what nothing else decides.",
+        help="Who decides the tables. auto: counting and regions, confirmed by Z3 within a budget of steps. both: confirmed by Z3, "
+        "else undecided. boxes: Z3 only for what nothing else decides. z3: Z3 alone.",
     )
     @click.option(
         "-j",
@@ -82,7 +82,7 @@ def proving(command: Command) -> Command:
         *args: Any,
         steps: int,
         memory: int,
-        solver: Literal["auto", "both", "boxes"],
+        solver: SolverChoice,
         jobs: int,
         no_cache: bool,
         **kwargs: Any,

@@ -88,7 +88,6 @@ _OF_VERDICT = {
 }
 _REPEATED = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """What is right, and said again by every check."""
-_METHODS = {"boxes": "boxes", "tree": "a tree of regions", "z3": "Z3"}
 
 
 def show(report: Report, command: str, output: Output, closing: str = "") -> None:
@@ -230,12 +229,8 @@ def summary(report: Report) -> Iterator[Row]:
 
 
 def backing(table: TableReport) -> str:
-    """Return the backing in words: `15 lines, by boxes, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
-    parts = [f"{table.lines} line{'' if table.lines == 1 else 's'}"]
-    if table.method:
-        parts.append(f"by {_METHODS.get(table.method, table.method)}")
-    if table.confirmed_by_z3:
-        parts.append("confirmed by Z3")
+    """Return the backing in words: `15 lines, decided by counting, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
+    parts = [f"{table.lines} line{'' if table.lines == 1 else 's'}", table.backed]
     if table.assumptions:
         parts.append(f"assuming {', '.join(_assumed(table))}")
     if table.together is not None:

@@ -16,6 +16,7 @@ Examples:
   rcsc check                     everything below this folder
   rcsc check tables/task -j 2    one folder, two tables at once
   rcsc check --solver both       ask Z3 about every table, however large
+  rcsc check --solver z3         let Z3 alone decide, and nothing else
   cat grip.rcs | rcsc check -    a text from a pipe
   rcsc check --format line       one line a finding, for an editor""",
 )
