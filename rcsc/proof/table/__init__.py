@@ -34,7 +34,7 @@ What it costs: pairs of lines and slices of keys for boxes, a budget in steps fo
 undecided, and fails.
 
 Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
-`confirm` (Z3, to confirm or alone), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.proof.certify`
+`confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.proof.certify`
 checks anew), `cells` (keys as cells), `repair` (proved before shown), `findings` (which to tell), `diagnose`,
 `mending` (what is proposed, tried in the text).
 """
