@@ -23,11 +23,12 @@ class Begun(StrEnum):
 
     CHECKPOINT = "checkpoint"  # that of its last cycle
     ANEW = "anew"  # that is lost, or ended in a fault: the state that `adopt` says
+    HAND = "hand"  # no restart: that of its last cycle, with what somebody set since
 
 
 @dataclass(frozen=True, slots=True)
 class Restarted:
-    """A level that was restarted between two cycles.
+    """A level that was restarted between two cycles, or in which somebody set something.
 
     Attributes:
         values: All leaves, from which its next cycle begins once it has taken its inputs.

@@ -11,13 +11,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import HELP, Commands
 from rcsc.desk.shell.reload.reload import Origin
 from rcsc.desk.shell.reload.sources import kept, laid_out
 from rcsc.desk.shell.session import Session
+from rcsc.front.commands.group import commands as group
+from rcsc.run.adopt import Begun
 from rcsc.run.description import description
+from rcsc.run.log.read import read
+from rcsc.run.log.replay import Replay
 from rcsc.run.system import Kind, assemble, signatures
 from rcsc.views.diff.changes.difference import ProgramDifference
 from rcsc.views.diff.compare import compare
@@ -162,7 +167,7 @@ def test_on_a_terminal_it_asks_completes_and_keeps_its_history(tmp_path: Path) -
     pytest.importorskip("prompt_toolkit")
     here, there = pty.openpty()
     ran = subprocess.Popen(
-        [*RCSC, "--alone", "--executor", "python"], cwd=REPO, stdin=there, stdout=there, stderr=there,
+        [*RCSC, "--alone", "--executor", "python", str(SYSTEM)], cwd=tmp_path, stdin=there, stdout=there, stderr=there,
         env={**os.environ, "XDG_STATE_HOME": str(tmp_path), "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}, start_new_session=True,
     )  # fmt: skip
     os.close(there)
@@ -173,6 +178,11 @@ def test_on_a_terminal_it_asks_completes_and_keeps_its_history(tmp_path: Path) -
         ran.kill()
         ran.wait()
         os.close(here)
+    log = read(tmp_path / "run.mcap")
+    assert log.complete
+    (told,) = log.level("task").restarts
+    assert log.first + 1 < told.tick < log.last  # while it ran
+    assert log.level("task").set_by_hand(told) == {"tbuffer_boxt": "7"}
     assert "+inc_command_seen ?" in (tmp_path / "rcsc" / "shell-history").read_text(encoding="utf-8")
 
 
@@ -190,7 +200,17 @@ def _converse(here: int, ran: subprocess.Popen[bytes]) -> None:
     _computes(ran.pid)
     ran.send_signal(signal.SIGINT)
     _until(here, "interrupted")
-    os.write(here, b"quit\r")
+    os.write(here, b"delete 1\r")
+    _until(here, "task>")
+    os.write(here, b"log run.mcap\r")
+    _until(here, "is written to")
+    os.write(here, b"run\r")
+    _computes(ran.pid)
+    os.write(here, b"TBUFFER-BOXT = 7\n")
+    _until(here, "task.tbuffer_boxt = 7")
+    os.write(here, b"tbuffer_boxt ?\nundo\n")
+    _until(here, "`undo` has to wait: cycles run")
+    os.write(here, b"quit\n")
 
 
 def _until(terminal: int, wanted: str) -> str:
@@ -276,6 +296,50 @@ def test_what_is_set_in_a_record_of_the_databases_is_its_answer(shell: Commands)
     do(shell, "step 2", "expect task.dest_spec = true", "undo 2", "step 2", "expect dest_spec = true")
     do(shell, "workstation.dest_locpt = 4", "step", "expect dest_spec = false")
     do(shell, "workstation.dest_locpt = 3", "step", "expect dest_spec = true")
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_what_is_set_by_hand_is_in_the_log_and_replay_follows_it(tmp_path: Path, kind: Kind) -> None:
+    commands, path = inhabited(kind), tmp_path / "by_hand.mcap"
+    do(commands, "tbuffer_boxt = 9")  # the log begins with it
+    do(commands, f"log {path}", *MOVE, "run 20", "cur_state = d_state", "tbuffer_boxt = 3", "step 2")
+    do(
+        commands,
+        "restart gripper",
+        "gripper.waited = 5",
+        "step",
+        "gripper",
+        "CMD-FAILURE",
+        "emove.idle = true",
+        "restart emove",
+    )
+    assert refused(commands, "undo").helps == ("`log off` ends it",)
+    assert refused(commands, "reload").helps == ("`log off` ends it",)
+    assert refused(commands, f"log {path}").code is Code.SHELL_COMMAND
+    assert do(commands, "step 3", "log off") == ["the log ends with cycle 26"]
+    do(commands, "step", "undo")  # nothing more is written
+    assert refused(commands, "log off").code is Code.SHELL_COMMAND
+    assert refused(commands, "log table.rcs").code is Code.SHELL_COMMAND
+    log = read(path)
+    again = Replay(log, REPO / "generated", kind)
+    moments = list(again.moments())
+    assert [moment.tick for moment in moments if moment.differs] == []
+    begun = {
+        (one.level, moment.tick): one.restarted
+        for moment in moments
+        for one in moment.cycles
+        if one.restarted
+    }
+    assert begun[("task", 21)] is begun[("gripper", 23)] is begun[("gripper", 24)] is Begun.HAND
+    assert begun[("emove", 24)] is Begun.CHECKPOINT
+    set_ = [log.level("task").set_by_hand(each) for each in log.level("task").restarts]
+    assert {"cur_state": "d_state", "tbuffer_boxt": "3"} in set_
+    assert {"to_workstation.failure": "cmd"} in set_
+    shown = CliRunner().invoke(group, ["log", str(path)], standalone_mode=False).output
+    assert "  set by hand before cycle 21: cur_state = d_state, tbuffer_boxt = 3\n" in shown
+    assert (
+        "  set by hand before cycle 1: workstation.inc_command = 1, workstation.input_command = move" in shown
+    )
 
 
 # --- by name ---------------------------------------------------------------------------

@@ -25,6 +25,7 @@ from rcsc.front.commands import run as rcsc
 from rcsc.lang.interpret import initial
 from rcsc.proof.solvers.smt import Answer, Solver, Term
 from rcsc.run.log.read import read
+from rcsc.run.log.replay import Replay
 from rcsc.run.log.ticks import frames
 from rcsc.run.system import System
 from tests.studio.served import Page, Refused, page, serving, until
@@ -178,6 +179,33 @@ def test_both_pages_see_the_same_and_one_that_goes_stops_nothing(dock: Path) -> 
         assert other.events["run.state"]["tick"] == tick
 
     studio(dock, work)
+
+
+def test_variables_are_read_and_set_while_it_runs_and_the_log_has_what_was_set(dock: Path) -> None:
+    async def work(one: Page, other: Page) -> None:
+        for outside in ("log ../run.mcap", f"log {dock.parent / 'run.mcap'}"):
+            assert (await shown(one, outside))[0].startswith("refused: the path of a log")
+        assert (await shown(one, "log kept/run.mcap"))[0].startswith("every cycle from 1 on is written to")
+        await one.ask("run.rate", rate=2.0)
+        await one.ask("run.go")
+        await other.heard("run.state", going=True)
+        await until(lambda: other.events["run.state"]["tick"] > 5)
+        assert await shown(other, "drive.waited = 77") == ["drive.waited = 77"]
+        begun = other.events["run.state"]["tick"]
+        await until(lambda: other.events["run.state"]["tick"] > begun + 5)
+        assert await shown(one, "drive.waited ?") == ["drive.waited = 77"]
+        assert other.events["run.state"]["going"]
+        await other.ask("run.pause")
+        assert (await shown(one, "log off"))[0].startswith("the log ends with cycle ")
+
+    studio(dock, work)
+    log = read(dock.parent / "kept" / "run.mcap")
+    (told,) = log.level("drive").restarts
+    assert told.tick > 6
+    assert log.level("drive").set_by_hand(told) == {"waited": "77"}
+    again = Replay(log, dock.parent / "generated", "python")
+    assert again.unchanged
+    assert again.first_difference() is None
 
 
 def test_a_run_is_answered_where_it_ends_and_a_page_may_look_on_meanwhile(dock: Path) -> None:

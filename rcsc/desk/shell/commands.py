@@ -7,8 +7,10 @@ import re
 from collections.abc import Callable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.names import BadName, within
 from rcsc.desk.shell import typed_names
 from rcsc.desk.shell.part_runs import call_of, part_names
 from rcsc.desk.shell.queries import StateQuery, asked
@@ -40,7 +42,8 @@ show [LEVEL]            what the last cycle changed, and what was set since; all
 buffers [NAME]          the latest value of each buffer
 step [N]                N cycles of all levels
 step LEVEL [N]          N cycles of one level alone: its neighbours are what its buffers say
-run [N]                 N cycles, or until a breakpoint
+run [N]                 N cycles, or until a breakpoint; on a terminal, while it runs, whatever is typed is done between two
+                        cycles, as `NAME ?` and `NAME = VALUE`, and Ctrl-C ends it
 run until CONDITION     until it holds
 run to [LEVEL.]TABLE.LINE
                         until the level runs that line
@@ -55,6 +58,7 @@ restart LEVEL [anew]    start a level again, as if its process had been killed: 
 freeze BUFFER, thaw BUFFER
                         what is written to a buffer gets lost, or arrives again
 undo [N]                go back to before the last cycle, or the last N
+log FILE.mcap, log off  write every cycle from here on, with what is set by hand, for `rcsc log` and `rcsc replay`; end it
 reload [LEVEL] [anyway] prove and take a level's tables as they are now, with what they do otherwise; `anyway` even
                         where the present state is one in which the next cycle does otherwise
 reload [LEVEL] proved   the same, but first prove the levels together, which may take minutes, and take it only then
@@ -89,11 +93,15 @@ class Commands:
 
     Attributes:
         over: Whether `quit` was typed.
+        heard: Whether somebody may type while cycles run, and end them.
+        folder: In which alone logs are written, where who types is no user of this machine; None for anywhere.
         clear: Clears the screen, where there is one.
     """
 
     session: Session
     over: bool = False
+    heard: bool = False
+    folder: Path | None = None
     clear: Callable[[], None] = field(default=lambda: None, repr=False)
 
     def do(self, line: str) -> Output:
@@ -124,7 +132,7 @@ class Commands:
             "diff": self._diff,
             "expect": self._expect, "fault": self._fault, "faults": self._faults,
             "freeze": self._freeze, "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
-            "lines": self._lines, "quit": self._quit, "reload": self._reload, "restart": self._restart, "run": self._run,
+            "lines": self._lines, "log": self._log, "quit": self._quit, "reload": self._reload, "restart": self._restart, "run": self._run,
             "show": self._show, "step": self._step, "thaw": self._thaw, "undo": self._undo,
         }  # fmt: skip
 
@@ -327,7 +335,7 @@ class Commands:
             return RunOrder(MOST_CYCLES, self.session.question(more))
         if word == "to":
             return self._run_to(more.strip())
-        if not rest and not self.session.stops.every:
+        if not (rest or self.heard or self.session.stops.every):
             raise Refused(
                 Code.SHELL_COMMAND,
                 "nothing would stop it",
@@ -351,6 +359,23 @@ class Commands:
         if line is None:
             raise typed_names.unknown(place, "line", self.completions())
         return line
+
+    def _log(self, rest: str) -> Output:
+        if rest == "off":
+            if not self.session.end_log():
+                raise Refused(Code.SHELL_COMMAND, "no log is being written", "`log FILE.mcap` begins one")
+            return [f"the log ends with cycle {self.session.system.tick}"]
+        if not rest.endswith(".mcap"):
+            raise Refused(
+                Code.SHELL_COMMAND, f"`{rest}` is no name of a log", "write `log FILE.mcap`, or `log off`"
+            )
+        try:
+            path = (
+                Path(rest) if self.folder is None else within(self.folder, self.folder, rest, "path of a log")
+            )
+        except BadName as error:
+            raise Refused(Code.SHELL_COMMAND, str(error)) from error
+        return [self.session.log(path)]
 
     def _undo(self, rest: str) -> Output:
         self.session.undo(_number(rest or "1"))

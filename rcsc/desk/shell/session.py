@@ -5,9 +5,10 @@ printed here.
 """
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.base.diagnostics.codes import Code
@@ -23,6 +24,7 @@ from rcsc.desk.shell.stops import Stops, reached, stands
 from rcsc.desk.shell.typed_names import NamedLine
 from rcsc.lang.model import Program
 from rcsc.proof.solvers.smt import spent
+from rcsc.run.adopt import Begun, Restarted
 from rcsc.run.description import BadDescription, Description, LevelSpec
 from rcsc.run.faults import UnknownFault, switch
 from rcsc.run.levels import Fill, Query, RunningLevel
@@ -35,6 +37,7 @@ from rcsc.run.system import StateTableError, System
 
 if TYPE_CHECKING:
     from rcsc.desk.shell.reload.sources import KeptSources
+    from rcsc.run.log.recorder import Recorder
 
 MOST_CYCLES = 100_000
 """After which `run` gives up: more than an hour of control time."""
@@ -49,6 +52,7 @@ class Session:
         interrupted: Set, and cleared again, from outside: cycles end after the present one.
         faults: Of the plants, that are on by hand.
         changes: How often something was done that `undo` takes back, and was not taken back.
+        between: Called between two cycles of `run`: what is typed while it runs is done there.
     """
 
     def __init__(self, system: System, plant: Origin) -> None:
@@ -61,6 +65,8 @@ class Session:
         self.interrupted = False
         self.faults: frozenset[str] = frozenset()
         self.changes = 0
+        self.between: Callable[[], None] = lambda: None
+        self._log: Recorder | None = None
         self._past: deque[history.KeptMoment] = deque(maxlen=history.MOST)
         self._answers: dict[tuple[object, ...], Values] = {}
         # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
@@ -144,6 +150,7 @@ class Session:
         except StateTableError as error:
             raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
         level.give(self.memory)
+        self._by_hand(level)
         if fault:
             raise Refused(Code.STATE_TABLE_ERROR, _fault(level), "`undo` takes the cycle back")
 
@@ -157,6 +164,7 @@ class Session:
         self._keep()
         level.executor.put(0, ran.values[: len(level.sign.leaves)])
         level.values = _spoken(level, ran.values)
+        self._by_hand(level)
         return [f"{level.name}: {ran.text}", *self.changed()]
 
     def run(self, most: int, until: StateQuery | NamedLine | None = None) -> str:
@@ -167,8 +175,11 @@ class Session:
         """
         if until is not None and self.holds(until):
             return f"cycle {self.system.tick}: {reached(until)}"
-        ended = next((why for why in islice(self.cycles(until), most) if why), "")
-        return ended or self.not_met(most, until)
+        for why in islice(self.cycles(until), most):
+            if why:
+                return why
+            self.between()
+        return self.not_met(most, until)
 
     def cycles(self, until: StateQuery | NamedLine | None = None) -> Iterator[str]:
         """Run cycle after cycle; say after each why a run is to end there, and nothing where it is not.
@@ -258,6 +269,7 @@ class Session:
         Raises:
             Refused: So many are not kept.
         """
+        self._not_logged("undone")
         if count > len(self._past):
             raise Refused(Code.SHELL_COMMAND, f"only {len(self._past)} cycles can be undone")
         moment = self._past[-count]
@@ -315,7 +327,17 @@ class Session:
                 record = level.values[first:end] if held is None else _with(held, at - first, value)
                 self.memory.publish(buffer, record)
         self._answer(level, at)
+        self._by_hand(level)
         return typed_names.shown(level, at)
+
+    def _by_hand(self, level: RunningLevel) -> None:
+        """Have whoever watches the next cycle know from what it begins: a level goes on from what was set."""
+        self._forget_hand(level.name)
+        self.system.restarts.append(Restarted(level.name, Begun.HAND, level.values[: len(level.sign.leaves)]))
+
+    def _forget_hand(self, name: str) -> None:
+        restarts = self.system.restarts
+        restarts[:] = [one for one in restarts if (one.level, one.begun) != (name, Begun.HAND)]
 
     def order(self, to: Served, given: Mapping[str, str]) -> int:
         """Orders a level from outside, with the next number; fields that are not given are as at first.
@@ -360,6 +382,60 @@ class Session:
 
         return query
 
+    # --- the log ---
+
+    def log(self, path: Path) -> str:
+        """Write every cycle from the next one on to a file, with what is set by hand before it.
+
+        Raises:
+            Refused: A log is being written, or this one cannot be.
+        """
+        if self._log is not None:
+            raise Refused(Code.SHELL_COMMAND, "a log is being written", "`log off` ends it")
+        try:
+            from rcsc.run.log.recorder import Recorder  # of an extra
+
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._log = Recorder(self.system, path)
+        except OSError as error:
+            raise Refused(Code.SHELL_COMMAND, f"`{path}` cannot be written: {error.strerror}") from error
+        except ModuleNotFoundError as error:
+            message = f"`{error.name}` is not installed"
+            raise Refused(Code.EXTRA_MISSING, message, "pip install 'rcsc[log]'") from error
+        self.system.watch.append(self._record)
+        return f"every cycle from {self.system.tick + 1} on is written to {path}"
+
+    def end_log(self) -> bool:
+        """End the log; say whether one was written.
+
+        Raises:
+            Refused: Its end could not be written.
+        """
+        log, self._log = self._log, None
+        if log is None:
+            return False
+        self.system.watch.remove(self._record)
+        try:
+            log.close()
+        except OSError as error:
+            raise Refused(Code.SHELL_COMMAND, f"the log ends here: {error.strerror}") from error
+        return True
+
+    def _record(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
+        """Raises: Refused: The cycle cannot be written; it was done, and no more is written."""
+        assert self._log is not None  # only while one is written
+        try:
+            self._log(system, ran)
+        except OSError as error:
+            self._log = None
+            system.watch[:] = [watch for watch in system.watch if watch != self._record]
+            system.restarts.clear()
+            raise Refused(Code.SHELL_COMMAND, f"the log ends here: {error.strerror}") from error
+
+    def _not_logged(self, what: str) -> None:
+        if self._log is not None:
+            raise Refused(Code.SHELL_COMMAND, f"what a log holds cannot be {what}", "`log off` ends it")
+
     # --- other tables ---
 
     def reload(self, name: str, *, anyway: bool = False, prove: bool = False) -> list[str]:
@@ -373,6 +449,7 @@ class Session:
         Raises:
             Refused: They are not taken; the old ones run on.
         """
+        self._not_logged("changed")
         old, reloaded, judged = self._try_reload(name, prove=prove)
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]
@@ -389,6 +466,7 @@ class Session:
                 f"`reload {name} anyway` takes them",
             )
         self._keep()
+        self._forget_hand(name)
         self._programs[id(reloaded.level)] = reloaded.level, reloaded.program
         self._builds[id(reloaded.level)] = reloaded.level, reloaded.digest, reloaded.sources
         self.system.levels = tuple(reloaded.level if level is old else level for level in self.levels)

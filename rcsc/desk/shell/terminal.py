@@ -1,9 +1,11 @@
 """A session's commands from a person or from a file.
 
 In: commands, lines, functions that show. Out: 0, or 1 where a command failed. The only importer of prompt_toolkit, which is
-asked only where there is a terminal.
+asked only where there is a terminal. There, what is typed while cycles run is done between two of them.
 """
 
+import os
+import select
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.commands import Commands
 from rcsc.desk.shell.reload.refusal import Refused
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
     from prompt_toolkit.history import History
 
 Show = Callable[[str], None]
+MOST_TYPED = 4096
+"""Bytes that a terminal gives at once: one line."""
+_NOT_MEANWHILE = ("run", "step", "undo", "reload")
 Complain = Callable[[str, Refused], None]
 """Shows a refusal; the text says where it arose, `script:3: `, or nothing."""
 
@@ -47,6 +53,7 @@ def converse(commands: Commands, show: Show, complain: Complain) -> int:
     from prompt_toolkit.shortcuts import clear
 
     prompt, commands.clear = _prompt(commands), clear
+    listen(commands, show, complain)
     while not commands.over:
         try:
             line = prompt.prompt(f"{commands.session.chosen}> ")
@@ -63,6 +70,44 @@ def converse(commands: Commands, show: Show, complain: Complain) -> int:
         for text in output:
             show(text)
     return 0
+
+
+def listen(commands: Commands, show: Show, complain: Complain, terminal: int = 0) -> None:
+    """Have what is typed while cycles run done between two of them.
+
+    Args:
+        commands: What does it.
+        show: Shows what is said.
+        complain: Shows a refusal; the cycles go on.
+        terminal: Where it is typed: a terminal that gives whole lines.
+    """
+
+    def between() -> None:
+        if not select.select([terminal], [], [], 0)[0]:
+            return
+        typed = os.read(terminal, MOST_TYPED).decode(errors="replace")
+        commands.over |= not typed  # nobody is there any more
+        for line in typed.splitlines():
+            try:
+                for text in _meanwhile(commands, line):
+                    show(text)
+            except Refused as refused:
+                complain("", refused)
+        commands.session.interrupted |= commands.over
+
+    commands.heard, commands.session.between = True, between
+
+
+def _meanwhile(commands: Commands, line: str) -> list[str]:
+    """Do a line between two cycles.
+
+    Raises:
+        Refused: It was not done; cycles cannot be run, taken back or changed while they run.
+    """
+    word = line.partition("#")[0].strip().partition(" ")[0].casefold()
+    if word in _NOT_MEANWHILE:
+        raise Refused(Code.SHELL_COMMAND, f"`{word}` has to wait: cycles run", "Ctrl-C ends them")
+    return commands.do(line)
 
 
 @contextmanager

@@ -147,6 +147,7 @@ def json_text(log: Log) -> str:
         "levels": [level.name for level in log.levels],
         "restarts": [
             {"level": level.name, "tick": restart.tick, "from": restart.begun.value}
+            | ({"set": dict(level.set_by_hand(restart))} if restart.by_hand else {})
             for level in log.levels
             for restart in level.restarts
         ],

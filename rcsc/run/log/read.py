@@ -87,7 +87,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class LoggedRestart:
-    """A level that was started again.
+    """A level that was started again, or in which somebody set something.
 
     Attributes:
         tick: That of the cycle that it came before.
@@ -98,13 +98,18 @@ class LoggedRestart:
     begun: Begun
     values: Values
 
+    @property
+    def by_hand(self) -> bool:
+        """Whether nothing was started again, but set."""
+        return self.begun is Begun.HAND
+
 
 @dataclass(frozen=True, slots=True)
 class LoggedLevel:
     """A level of a log; the first record is what it started from, every other one a cycle.
 
     Attributes:
-        restarts: In order; logs that were written before there were such records have none.
+        restarts: In order, with what was set by hand; logs that were written before there were such records have none.
     """
 
     name: str
@@ -117,6 +122,15 @@ class LoggedLevel:
         """Return the restart before the cycle at this place; None where it went on from the record before."""
         after, until = self.track.ticks[at - 1], self.track.ticks[at]
         return next((restart for restart in reversed(self.restarts) if after < restart.tick <= until), None)
+
+    def set_by_hand(self, restart: LoggedRestart) -> Mapping[str, str]:
+        """Return what of a restart's values the cycle before it had not left, by name; nothing where it is no hand's."""
+        left = self.track.latest(restart.tick - 1) if restart.by_hand else None
+        return {
+            leaf.name: leaf.shown(now)
+            for leaf, was, now in zip(self.sign.leaves, left or (), restart.values, strict=False)
+            if leaf.shown(was) != leaf.shown(now)
+        }
 
 
 @dataclass(frozen=True, slots=True)

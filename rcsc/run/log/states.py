@@ -51,13 +51,14 @@ def witness_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
 
 
 def begun_in_words(begun: Begun) -> str:
-    """Name the state from which a restarted level went on."""
+    """Name the state from which a level went on that was restarted, or set by hand."""
     return _BEGUN[begun]
 
 
 _BEGUN = {
     Begun.CHECKPOINT: "from the state that its last cycle left",
     Begun.ANEW: "anew, its command failed and its orders at rest",
+    Begun.HAND: "from what was set by hand",
 }
 
 

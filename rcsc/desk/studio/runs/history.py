@@ -56,7 +56,7 @@ class History:
     def settle(self, system: System) -> None:
         """Follow what something else than a cycle did: undo, other tables, values that were set by hand.
 
-        What was set between two cycles is kept as the state from which the later one begins, as of a level that is started again.
+        What was set between two cycles is kept as the state from which the later one begins, as a log has it.
         """
         held = [log for log in self.logs if log.first <= system.tick]
         taken_back = len(held) < len(self.logs)
@@ -124,6 +124,7 @@ class History:
         again = {
             restart.level: LoggedRestart(system.tick, restart.begun, restart.values)
             for restart in system.restarts
+            if restart.begun is not Begun.HAND  # which `settle` keeps
         }
         levels = tuple(
             replace(level, restarts=(*level.restarts, again[level.name])) if level.name in again else level
@@ -155,5 +156,5 @@ def _settled(logged: LoggedLevel, level: RunningLevel, tick: int) -> LoggedLevel
     leaves = level.values[: len(level.sign.leaves)]
     record = logged.track.layout.unpack(logged.track.packed[-1])[: len(leaves)]
     before = next((one.values for one in reversed(earlier) if one.tick > logged.track.ticks[-1]), record)
-    by_hand = () if leaves == before else (LoggedRestart(tick + 1, Begun.CHECKPOINT, leaves),)
+    by_hand = () if leaves == before else (LoggedRestart(tick + 1, Begun.HAND, leaves),)
     return replace(logged, restarts=(*earlier, *by_hand))

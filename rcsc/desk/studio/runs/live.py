@@ -6,9 +6,10 @@ that a pause is heard between two of them; nothing here waits for a page, and a 
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from itertools import islice
+from pathlib import Path
 from typing import Any, cast
 
 from rcsc.base.diagnostics.coded import CodedError
@@ -19,6 +20,7 @@ from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import Session
 from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.history import History
+from rcsc.lang.project import project_root
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.read import LoggedLevel
@@ -156,8 +158,9 @@ class Live(Concern):
         return self.state()
 
     def close(self) -> None:
-        """Stop running."""
+        """Stop running, and end the log that is being written."""
         self._going = None
+        self._end_log()
 
     def open(self) -> None:
         """Open the system anew; the run before is gone."""
@@ -172,6 +175,7 @@ class Live(Concern):
         except BaseException as error:
             self.close_because(f"a bug in rcsc: {type(error).__name__}")
             raise
+        commands.folder = Path(project_root(str(self.opening.path)))
         system = commands.session.system
         self.history.begin(system)
         system.watch.append(self.history.add)
@@ -191,10 +195,16 @@ class Live(Concern):
         self.changed()
 
     def _drop(self, why: str) -> None:
-        """End a run whose system goes away, and report that to whoever asked for it."""
+        """End a run whose system goes away, with its log, and report that to whoever asked for it."""
+        self._end_log()
         going, self._going, self._ended = self._going, None, ""
         if going is not None:
             going.done(lambda: _shown([], Refused(Code.STUDIO, why)))
+
+    def _end_log(self) -> None:
+        if self.commands is not None:
+            with suppress(Refused):  # its cycles are there; of a log without an end readers say so
+                self.commands.session.end_log()
 
     def held(self, seconds: float) -> None:
         """Tell every page how long one thing takes; 0 once it is over. Not called in the lane, which is held."""

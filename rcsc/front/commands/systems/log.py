@@ -169,7 +169,7 @@ def _summary(log: Log) -> None:
 
 
 def _summed(level: LoggedLevel) -> None:
-    """Print how many cycles a level had, the last fault, and how often the level was started again."""
+    """Print how many cycles a level had, the last fault, and when the level was started again or set by hand."""
     values = level.track.layout.unpack(level.track.packed[-1])
     said = (form(level.sign, level.level, values) for form in (fault_in_words, witness_in_words))
     fault = "; ".join(filter(None, said))
@@ -177,7 +177,11 @@ def _summed(level: LoggedLevel) -> None:
         f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
     )
     for restart in level.restarts[:SHOWN]:
-        click.echo(f"  started again before cycle {restart.tick}: {begun_in_words(restart.begun)}")
+        begun = begun_in_words(restart.begun)
+        if restart.by_hand:
+            begun = ", ".join(f"{name} = {value}" for name, value in level.set_by_hand(restart).items())
+        told = "set by hand" if restart.by_hand else "started again"
+        click.echo(f"  {told} before cycle {restart.tick}: {begun}")
     if len(level.restarts) > SHOWN:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
 

@@ -9,6 +9,7 @@ import click
 from rcsc.base.diagnostics.codes import Code
 from rcsc.front.commands.shared.logs import FILE, SHOWN, refuse, told
 from rcsc.front.commands.shared.systems import SYSTEM, NoSystem, as_they_lie, fresh, system_path
+from rcsc.run.adopt import Begun
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, read
@@ -110,7 +111,8 @@ def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None
     click.echo(f"cycle {moment.tick}, {moment.tick * again.log.tick_ms} ms")
     for cycle in moment.cycles:
         if cycle.restarted is not None:
-            click.echo(f"  {cycle.level}: started again, {begun_in_words(cycle.restarted)}")
+            again_ = "goes on" if cycle.restarted is Begun.HAND else "started again,"
+            click.echo(f"  {cycle.level}: {again_} {begun_in_words(cycle.restarted)}")
         logged = again.log.level(cycle.level)
         fault = fault_in_words(logged.sign, logged.level, cycle.recorded)
         click.echo(f"  {cycle.level}: {fault or cycle.line_then}")
