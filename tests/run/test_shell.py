@@ -278,6 +278,48 @@ def test_an_unknown_name_comes_with_those_near_it(shell: Commands) -> None:
     assert "its parts: workstation.inc_command" in refused(shell, "workstation = pause").helps[0]
 
 
+def test_the_names_of_the_level_chosen_come_first(shell: Commands) -> None:
+    """At GRIPPER `primitive.speed_mm_s` is of its orders, and a state of PRIMITIVE's, too."""
+    do(shell, "level gripper", "PRIMITIVE.SPEED-MM-S = 80", "run until primitive.speed_mm_s = 80")
+    assert do(shell, "primitive.speed_mm_s ?") == ["gripper.primitive.speed_mm_s = 80.0 [mm/s]"]
+    assert do(shell, "primitive-level.speed_mm_s ?") == ["primitive.speed_mm_s = 0.0 [mm/s]"]
+    assert do(shell, "PRIMITIVE-LEVEL.SPEED-MM-S = 7") == ["primitive.speed_mm_s = 7.0 [mm/s]"]
+    do(shell, "expect gripper.primitive.speed_mm_s = 80 and primitive-level.speed_mm_s = 7")
+    do(shell, "level task", "expect primitive.speed_mm_s = 7 and gripper-level.primitive.speed_mm_s = 80")
+    error = refused(shell, "travelled_mm ?")
+    assert str(error) == "level `task` has no variable `travelled_mm`"
+    assert error.helps == ("of other levels: `primitive.travelled_mm`",)
+    assert do(shell, "primitive-level.preprocess")[0].startswith("primitive: preprocess")
+
+
+TWICE = """input Go : bool
+input go : bool
+state at : int 0 .. 9
+procedure twice { at := 3 }
+table t {
+  | line | Go    || procedures |
+  | yes  | true  || twice      |
+  | no   | false ||            |
+}
+level twice { period 40 [ms] table t }
+"""
+
+
+def test_a_name_that_means_two_things_is_refused_with_both(tmp_path: Path) -> None:
+    source = tmp_path / "twice.rcs"
+    source.write_text(TWICE, encoding="utf-8")
+    (tmp_path / "system.toml").write_text(system(["twice"], {}), encoding="utf-8")
+    compile_beside(source)
+    commands = alone(tmp_path / "system.toml", "python")
+    for line in ("GO ?", "GO = true", "expect GO"):
+        assert str(refused(commands, line)) == "`GO` may be `twice-level.Go` or `twice-level.go`", line
+    assert do(commands, "go = true") == ["twice.go = true"]
+    assert do(commands, "twice-level.Go ?") == ["twice.Go = false"]
+    assert str(refused(commands, "twice")) == "`twice` may be `twice-level` or `twice.twice`"
+    assert do(commands, "twice-level") == ["twice alone: twice.t.no"]
+    assert do(commands, "twice.twice", "at ?") == ["twice.at = 3"]
+
+
 def test_what_is_set_stands_in_the_buffer_that_carries_it(shell: Commands) -> None:
     do(shell, "gripper.primitive.input_command = position", "gripper.primitive.opening_mm = 50")
     assert "input_command position, opening_mm 50.0" in do(shell, "buffers gripper.primitive")[0]

@@ -26,14 +26,14 @@ from rcsc.run.orders.roles import served
 Output = list[str]
 _SHOW = re.compile(rf"(?P<name>{NAME})\s*\?$")
 _SET = re.compile(rf"(?P<name>{NAME})\s*=(?!=)\s*(?P<value>.*)$")
-_SUFFIX = "_level"
 HELP = """\
 NAME                    run the module, procedure, owner or table of that name on the level chosen
 NAME(VALUE, ...)        the same, with arguments
 PREPROCESS, STATE-TABLE, POSTPROCESS
                         run that part of the level chosen
 TASK-LEVEL              run one cycle of level `task` alone
-NAME ?                  show a variable of the level chosen; LEVEL.NAME ? of another
+NAME ?                  show a variable of the level chosen; LEVEL.NAME ? of another, and LEVEL-level.NAME ? where the level
+                        chosen has a buffer that is called like it
 NAME = VALUE            set it, in the buffer that carries it too
 level [LEVEL]           choose a level
 levels                  all levels
@@ -181,8 +181,15 @@ class Commands:
         name, args = call
         cycled = self._cycled(name)
         if cycled is not None:
+            part = (
+                None
+                if normal(name).endswith(typed_names.LEVEL)
+                else known_name(name, self._parts(self.session.level))
+            )
+            if part is not None:
+                raise typed_names.ambiguous(name, (f"{cycled.name}-level", f"{self.session.chosen}.{part}"))
             return self._alone(cycled, _number(args[0]) if args else 1)
-        level, rest = typed_names.split(name, self.session.levels, self.session.level)
+        level, rest = typed_names.addressed(name, self.session.levels) or (self.session.level, name)
         if known_name(rest, part_names(self.session.program(level))) is None:
             raise self._unknown(name)
         return self.session.part(level, rest, args)
@@ -191,7 +198,7 @@ class Commands:
         """The level that `task-level`, or `task`, cycles."""
         wanted = normal(name)
         every = {normal(level.name): level for level in self.session.levels}
-        return every.get(wanted.removesuffix(_SUFFIX)) or every.get(wanted)
+        return every.get(wanted.removesuffix(typed_names.LEVEL)) or every.get(wanted)
 
     def _unknown(self, name: str) -> Refused:
         level, rest = typed_names.split(name, self.session.levels, self.session.level)

@@ -318,7 +318,9 @@ class Session:
             Refused: There is none, or the text is no value of it.
         """
         level, at = typed_names.one_leaf(name, self.levels, self.level)
-        value = typed_names.value_of(level.sign.leaves[at], text)
+        return self._set(level, at, typed_names.value_of(level.sign.leaves[at], text))
+
+    def _set(self, level: RunningLevel, at: int, value: Value) -> str:
         level.executor.put(at, (value,))
         level.values = _spoken(level, _with(level.values, at, value))
         for buffer, first, end in _carriers(level):
@@ -359,7 +361,7 @@ class Session:
             to.order_with({name: typed_names.value_of(fields[name], text) for name, text in given.items()})
         )
         for leaf, value in zip(to.order_leaves, line.sent, strict=True):
-            self.set(f"{to.level}.{leaf.name}", leaf.shown(value))
+            self._set(level, level.sign.index[leaf.name], value)
         return line.number
 
     def _answer(self, level: RunningLevel, at: int) -> None:

@@ -1,10 +1,10 @@
-"""Names as people type them: `REMOVE-FROM-BUFFER-DB` is `remove_from_buffer_db`; suggestions for an unknown one.
+"""Names as people type them: `REMOVE-FROM-BUFFER-DB` is `remove_from_buffer_db`, what one stands at first; suggestions for an unknown one.
 
 In: words, levels. Out: levels, leaves, lines and values, or a refusal.
 """
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.base.diagnostics.codes import Code
@@ -12,6 +12,9 @@ from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import known_name, normal
 from rcsc.run.signature import Leaf, Signature, Value, number_word
+
+LEVEL = "_level"
+"""After a level's name: that level, and nothing that is called like it (`TASK-LEVEL`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,26 +58,37 @@ def level_of(name: str, levels: Sequence[RunningLevel]) -> RunningLevel:
 
 
 def split(name: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> tuple[RunningLevel, str]:
-    """The level that a name speaks of, and the rest of it: `task.cur_state`, or `cur_state` of the level chosen."""
+    """The level of a variable, and its name there: `task.cur_state`, or `cur_state` of the level chosen.
+
+    A buffer may be called like the level at its other end, and what one stands at comes first: at GRIPPER `primitive.speed_mm_s` is of
+    its own orders, and `primitive-level.speed_mm_s`, which means the level wherever one stands, is PRIMITIVE's.
+    """
+    own = positions(chosen.sign, name)
+    return (not own and addressed(name, levels)) or (chosen, name)
+
+
+def addressed(name: str, levels: Sequence[RunningLevel]) -> tuple[RunningLevel, str] | None:
+    """The level that a name begins with, as `task.` or `task-level.`, and the rest; None where it begins with none."""
     head, point, rest = name.partition(".")
-    meant = known_name(head, [level.name for level in levels]) if point else None
-    if meant is None:
-        return chosen, name
-    level = next(level for level in levels if level.name == meant)
-    # A buffer may be called like the level at its other end: in TASK `emove.failure` is EMOVE's own variable, and
-    # `emove.inc_command_echo`, which EMOVE has not, the buffer's.
-    return (
-        (chosen, name) if not positions(level.sign, rest) and positions(chosen.sign, name) else (level, rest)
-    )
+    every = {level.name: level for level in levels}
+    word = known_name(head, every) or known_name(normal(head).removesuffix(LEVEL), every)
+    return (every[word], rest) if point and word is not None else None
 
 
 def positions(sign: Signature, name: str) -> tuple[int, ...]:
-    """The leaves of a variable: one, or all of a record's or an array's; none where there is no such variable."""
-    wanted = normal(name)
+    """The leaves of a variable: one, or all of a record's or an array's; none where there is no such variable.
+
+    Names that differ in case or hyphens alone are told apart where one is spelled as it is.
+    """
+    exact = _under(sign, name, str)
+    return exact or _under(sign, normal(name), normal)
+
+
+def _under(sign: Signature, name: str, spelled: Callable[[str], str]) -> tuple[int, ...]:
     return tuple(
         at
         for at, leaf in enumerate(sign.leaves)
-        if normal(leaf.name) == wanted or normal(leaf.name).startswith((f"{wanted}.", f"{wanted}["))
+        if spelled(leaf.name) == name or spelled(leaf.name).startswith((f"{name}.", f"{name}["))
     )
 
 
@@ -84,22 +98,42 @@ def variable(
     """A variable and its leaves.
 
     Raises:
-        Refused: There is none of that name.
+        Refused: There is none of that name, or there are several.
     """
     level, rest = split(name, levels, chosen)
     places = positions(level.sign, rest)
     if not places:
-        own = [leaf.name for leaf in level.sign.leaves]
-        every = [f"{level.name}.{leaf.name}" for level in levels for leaf in level.sign.leaves]
-        raise unknown(name, "variable", own if level is chosen and rest == name else every)
+        raise _no_variable(name, rest, level, levels)
+    meant = tuple(dict.fromkeys(level.sign.leaves[at].name[: len(rest)] for at in places))
+    if len(meant) > 1:
+        raise ambiguous(name, [f"{level.name}-level.{one}" for one in meant])
     return level, places
+
+
+def ambiguous(name: str, spellings: Sequence[str]) -> Refused:
+    """The refusal of a name that means several things, with what to write for each."""
+    return Refused(
+        Code.SHELL_NAME, f"`{name}` may be {' or '.join(f'`{one}`' for one in spellings)}", "write which"
+    )
+
+
+def _no_variable(name: str, rest: str, level: RunningLevel, levels: Sequence[RunningLevel]) -> Refused:
+    if rest != name:
+        return unknown(
+            name, "variable", [f"{one.name}.{leaf.name}" for one in levels for leaf in one.sign.leaves]
+        )
+    others = [f"`{one.name}.{name}`" for one in levels if positions(one.sign, name)]
+    if others:
+        message = f"level `{level.name}` has no variable `{name}`"
+        return Refused(Code.SHELL_NAME, message, f"of other levels: {', '.join(others)}")
+    return unknown(name, "variable", [leaf.name for leaf in level.sign.leaves])
 
 
 def one_leaf(name: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> tuple[RunningLevel, int]:
     """A variable that is one leaf.
 
     Raises:
-        Refused: There is none of that name, or it is a record or an array.
+        Refused: There is none of that name, or several, or it is a record or an array.
     """
     level, places = variable(name, levels, chosen)
     wanted = normal(split(name, levels, chosen)[1])
@@ -112,13 +146,13 @@ def one_leaf(name: str, levels: Sequence[RunningLevel], chosen: RunningLevel) ->
 
 def line_of(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> NamedLine | None:
     """The line that `level.table.line`, or `table.line` of the level chosen, names; None where it names none."""
-    level, rest = split(text, levels, chosen)
-    table, _, line = rest.partition(".")
-    known = known_name(table, level.level.every_table)
-    if known is None:
-        return None
-    named = known_name(line, level.sign.tables[known])
-    return None if named is None else NamedLine(level.name, known, named)
+    for level, rest in ((chosen, text), addressed(text, levels) or (chosen, "")):
+        table, _, line = rest.partition(".")
+        known = known_name(table, level.level.every_table)
+        named = None if known is None else known_name(line, level.sign.tables[known])
+        if known is not None and named is not None:
+            return NamedLine(level.name, known, named)
+    return None
 
 
 def value_of(leaf: Leaf, text: str) -> Value:

@@ -313,7 +313,7 @@ function valuesTab(bus) {
         ? make("select", { "aria-label": one.name, disabled: !settable }, (one.members.length ? one.members : ["false", "true"]).map((word) => make("option", { selected: word === one.text }, word)))
         : make("input", { "aria-label": one.name, value: one.text, size: "12", disabled: !settable, spellcheck: "false" });
       value.addEventListener("focus", () => { editing = value; });
-      const set = () => { editing = null; bus.try("run.type", { line: `${level}.${one.name} = ${value.value}` }).then((answer) => { if (!answer) ask(); }); };
+      const set = () => { editing = null; bus.try("run.type", { line: `${level}-level.${one.name} = ${value.value}` }).then((answer) => { if (!answer) ask(); }); };
       value.addEventListener("change", set);
       return make("tr", { class: one.changed ? "changed" : "" }, make("td", { class: "code" }, one.name), make("td", {}, value), make("td", { class: "soft" }, one.unit),
         make("td", {}, one.changed ? "changed" : ""), make("td", { class: "soft" }, one.kind), make("td", { class: "soft" }, one.range),
