@@ -181,6 +181,24 @@ def test_both_pages_see_the_same_and_one_that_goes_stops_nothing(dock: Path) -> 
     studio(dock, work)
 
 
+def test_a_run_waits_for_the_answer_to_the_order_just_given(dock: Path) -> None:
+    """The order before stands reported as done until the level has seen the next one."""
+    commands, done = opened(Opening(dock)), "report.status_report = done"
+    for number, order in ((1, "undock"), (2, "stop"), (3, "undock")):
+        commands.do(f"order supervisor {order}")
+        commands.do(f"expect {done} and report.inc_command_echo = {number - 1}")
+        begun = commands.session.system.tick
+        commands.do(f"run until {done}")
+        commands.do(f"expect {done} and report.inc_command_echo = {number}")
+        assert commands.session.system.tick > begun
+    commands.do("order supervisor stop")
+    assert commands.do("run until report.inc_command_echo = 3 and " + done)[0].endswith("holds")
+    commands.do("expect report.inc_command_echo = 3")  # what looks at the number knows what it asks
+    commands.do(f"break {done}")
+    assert "breakpoint 1" in commands.do("run 100")[0]  # of the new order alone it comes to hold
+    commands.do("expect report.inc_command_echo = 4")
+
+
 def test_variables_are_read_and_set_while_it_runs_and_the_log_has_what_was_set(dock: Path) -> None:
     async def work(one: Page, other: Page) -> None:
         for outside in ("log ../run.mcap", f"log {dock.parent / 'run.mcap'}"):

@@ -44,7 +44,7 @@ step [N]                N cycles of all levels
 step LEVEL [N]          N cycles of one level alone: its neighbours are what its buffers say
 run [N]                 N cycles, or until a breakpoint; on a terminal, while it runs, whatever is typed is done between two
                         cycles, as `NAME ?` and `NAME = VALUE`, and Ctrl-C ends it
-run until CONDITION     until it holds
+run until CONDITION     until it holds; what a level still reports of an order before the last from outside does not count
 run to [LEVEL.]TABLE.LINE
                         until the level runs that line
 run to cycle N          until N cycles are done

@@ -31,8 +31,8 @@ from rcsc.run.levels import Fill, Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.log.states import begun_in_words
 from rcsc.run.orders.operator import line_to
-from rcsc.run.orders.roles import Served
-from rcsc.run.signature import Signature, Value, Values
+from rcsc.run.orders.roles import Served, served
+from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ class Session:
         Raises:
             Refused: As `cycle`.
         """
-        self.stops.look(self.levels)
+        self.stops.look(self._stands)
         while True:
             self.cycle()
             yield self._ended(until)
@@ -204,9 +204,9 @@ class Session:
 
     def _ended(self, until: StateQuery | NamedLine | None) -> str:
         """Say why a run ends after this cycle; empty where it does not."""
-        if until is not None and stands(until, self.levels):
+        if until is not None and self._stands(until):
             return f"cycle {self.system.tick}: {reached(until)}"
-        met = self.stops.met(self.levels)
+        met = self.stops.met(self._stands)
         if met is not None:
             return f"cycle {self.system.tick}: breakpoint {met.number}, {reached(met.what)}"
         return f"cycle {self.system.tick}: interrupted" if self.interrupted else ""
@@ -288,7 +288,28 @@ class Session:
 
     def holds(self, what: StateQuery | NamedLine) -> bool:
         """Return whether `run until` would have nothing to do: the condition holds already."""
-        return isinstance(what, StateQuery) and stands(what, self.levels)
+        return isinstance(what, StateQuery) and self._stands(what)
+
+    def _stands(self, what: StateQuery | NamedLine) -> bool:
+        """Return whether a run is to stop there: not for what is still reported of an order before the last."""
+        return stands(what, self.levels) and not (
+            isinstance(what, StateQuery) and self._of_order_before(what)
+        )
+
+    def _of_order_before(self, what: StateQuery) -> bool:
+        """Return whether a condition reads a report whose number is not the last order's, and does not look at that itself."""
+        for to in served(self.system.description, {level.name: level.sign for level in self.levels}):
+            level, order = self.system.level(to.level), self.memory.latest(to.order)
+            echo, *others = (level.sign.index[leaf.name] for leaf in _echo_first(to))
+            read = {at for name, at in what.leaves if name == to.level}
+            if (
+                order is not None
+                and order[to.number] != level.values[echo]
+                and echo not in read
+                and read & set(others)
+            ):
+                return True
+        return False
 
     def changed(self) -> list[str]:
         """Variables that the last cycle left with another value: `task.cur_state: d_state -> state_2`."""
@@ -528,6 +549,11 @@ class Session:
     def _keep(self) -> None:
         self.changes += 1
         self._past.append(history.kept(self.system, self.memory, self._answers, self.faults))
+
+
+def _echo_first(to: Served) -> tuple[Leaf, ...]:
+    """The fields of a report, that with the number of the order first."""
+    return (to.report_leaves[to.echo], *(leaf for at, leaf in enumerate(to.report_leaves) if at != to.echo))
 
 
 def _with(values: Values, at: int, value: Value) -> Values:

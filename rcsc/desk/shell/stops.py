@@ -1,6 +1,6 @@
 """Breakpoints: conditions and lines; `run` stops where one comes to hold."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.desk.shell.queries import StateQuery, asked, question
@@ -9,6 +9,8 @@ from rcsc.desk.shell.typed_names import NamedLine, level_of, line_of, unknown
 from rcsc.run.levels import RunningLevel
 
 Levels = Sequence[RunningLevel]
+Standing = Callable[[StateQuery | NamedLine], bool]
+"""Whether something to stop at is there now."""
 
 
 @dataclass(slots=True)
@@ -52,15 +54,15 @@ class Stops:
         self.every.append(Stop(self._numbered, what))
         return self.every[-1]
 
-    def look(self, levels: Levels) -> None:
+    def look(self, standing: Standing) -> None:
         """Notes what holds already."""
         for stop in self.every:
-            stop.stood = stands(stop.what, levels)
+            stop.stood = standing(stop.what)
 
-    def met(self, levels: Levels) -> Stop | None:
+    def met(self, standing: Standing) -> Stop | None:
         """Return the first that has come to hold since `look`."""
         before = [stop.stood for stop in self.every]
-        self.look(levels)
+        self.look(standing)
         return next(
             (stop for stop, stood in zip(self.every, before, strict=True) if stop.stood and not stood), None
         )
