@@ -15,6 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.desk.shell.opening import Opening, opened
+from rcsc.desk.shell.reload.refusal import Refused
+from rcsc.run.faults import switch
 from rcsc.run.signature import Values
 from rcsc_cell.cell.arm import LIMITS, margins_deg, plate, skeleton, solutions, solve
 from rcsc_cell.cell.faults import Faults
@@ -27,6 +30,7 @@ from rcsc_cell.cell.robot import FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import build
 from rcsc_cell.database.pose import Pose, Rotation, about_y, about_z, nine, pose_of, product
+from rcsc_cell.episodes.witness import Timed
 from rcsc_cell.vision.flood import Features
 from rcsc_cell.workstation.orders import DONE, EXECUTING, FAILED
 from rcsc_cell.workstation.prepared import prepare
@@ -392,3 +396,34 @@ def test_both_plants_have_a_fault_reported_alike(fault: str, tmp_path: Path) -> 
     physical = became("mujoco", path, fault, FAULTY[fault])
     assert became("kinematic", path, fault, FAULTY[fault]) == physical
     assert physical[-1][1] == "failed"
+
+
+def test_every_switch_is_one_by_name_for_the_shell_for_run_and_for_the_studio() -> None:
+    """The names of `--fault`, of the shell's `fault` and of the studio's list are those of the switches."""
+    begun = opened(Opening(SYSTEM, plant="kinematic", faults=("joint_stuck=3", "dark")))
+    assert [line for line in begun.do("faults") if line.endswith(" is on")] == [
+        "joint_stuck is on",
+        "dark is on",
+    ]
+    commands = opened(Opening(SYSTEM, plant="kinematic"))
+    outside = commands.session.system.outside
+    (cell,) = (part for part in outside if isinstance(part, Plant))
+    names = [field.name for field in fields(Faults)]
+    assert len(names) == 18
+    assert commands.do("faults") == names
+    for name in names:
+        commands.do(f"fault {name}")
+        assert cell.faults != Faults(), name
+        commands.do(f"fault {name} off")
+        assert cell.faults == Faults(), name
+    assert commands.do("fault late_ticks=7") == ["late_ticks=7 is on"]
+    assert (cell.faults.late_ticks, type(cell.faults.late_ticks)) == (7, int)
+    assert "late_ticks is on" in commands.do("faults")
+    for wrong in ("joint_stuck=7", "late_ticks=much", "shifted_mm=nan", "blind=2"):
+        with pytest.raises(Refused, match="strength"):
+            commands.do(f"fault {wrong}")
+    with pytest.raises(Refused, match="no plant has a fault"):
+        commands.do("fault blint")
+    timed = Timed(cell)
+    switch((timed,), "vise_stuck", on=True)
+    assert cell.faults.vise_stuck

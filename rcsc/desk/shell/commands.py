@@ -52,8 +52,8 @@ break CONDITION         stop `run` where it comes to hold; a line, too: break ta
 breaks, delete N        the breakpoints; one less
 order [LEVEL] COMMAND [FIELD=VALUE ...]
                         order a level from outside, with the next number; other fields are as at first
-faults                  the plant's faults
-fault NAME [off]        switch one on, or off
+faults                  the plant's faults, and which somebody switched on
+fault NAME [off]        switch one on, or off; NAME=STRENGTH where it has strengths: fault late_ticks=120
 restart LEVEL [anew]    start a level again, as if its process had been killed: as its last cycle left it, or anew
 freeze BUFFER, thaw BUFFER
                         what is written to a buffer gets lost, or arrives again
@@ -148,7 +148,9 @@ class Commands:
         yield from self._parts(self.session.level)
 
     def _faults(self, _rest: str) -> Output:
-        return list(faults_of(self.session.system.outside)) or ["no plant has any"]
+        on = self.session.faults
+        every = faults_of(self.session.system.outside)
+        return [f"{name} is on" if name in on else name for name in every] or ["no plant has any"]
 
     def _fault(self, rest: str) -> Output:
         name, _, to = rest.partition(" ")

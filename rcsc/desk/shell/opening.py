@@ -58,7 +58,9 @@ def opened(wanted: Opening) -> Commands:
     queries = silent_queries(system, signs) | dict(stage.queries)
     outside = standing(stage, system, signs) if wanted.script else stage.outside
     running = assemble(system, wanted.kind, queries, outside)
-    return Commands(Session(running, Origin(wanted.path, system, wanted.kind, queries)))
+    session = Session(running, Origin(wanted.path, system, wanted.kind, queries))
+    session.faults = frozenset(fault.partition("=")[0] for fault in wanted.faults)
+    return Commands(session)
 
 
 def _script(system: Description, wanted: Opening) -> str:

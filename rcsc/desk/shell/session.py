@@ -26,7 +26,7 @@ from rcsc.lang.model import Program
 from rcsc.proof.solvers.smt import spent
 from rcsc.run.adopt import Begun, Restarted
 from rcsc.run.description import BadDescription, Description, LevelSpec
-from rcsc.run.faults import UnknownFault, switch
+from rcsc.run.faults import BadStrength, UnknownFault, switch
 from rcsc.run.levels import Fill, Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.log.states import begun_in_words
@@ -238,16 +238,17 @@ class Session:
         return f"level `{name}` is started again, {begun_in_words(self.system.restarts[-1].begun)}"
 
     def fault(self, name: str, *, on: bool) -> str:
-        """Switch a fault of a plant on or off.
+        """Switch a fault of a plant on or off; `NAME=STRENGTH` on with that strength.
 
         Raises:
-            Refused: No plant has it.
+            Refused: No plant has it, or not that strength.
         """
         try:
             switch(self.system.outside, name, on=on)
-        except UnknownFault as error:
+        except (BadStrength, UnknownFault) as error:
             raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
-        self.faults = self.faults | {name} if on else self.faults - {name}
+        plain = name.partition("=")[0]
+        self.faults = self.faults | {plain} if on else self.faults - {plain}
         return f"{name} is {'on' if on else 'off'}"
 
     def freeze(self, buffer: str, *, on: bool) -> str:

@@ -228,11 +228,14 @@ _SWITCHES: dict[tuple[tuple[tuple[str, int], ...], str], tuple[str, ...]] = {}
 
 
 def switches(its: Stand, plant: str = "") -> tuple[str, ...]:
-    """Return the faults that a plant declares, in order.
+    """Return the faults that a plant declares, in order; of one whose episodes are of a kind of its own, which draws them, none.
 
     Raises:
         CodedError: The plant is not in order.
     """
+    spec = next((one for one in its.system.plants if plant in {"", one.name}), None)
+    if spec is not None and spec.campaign:
+        return ()
     key = its.files, plant
     if key not in _SWITCHES:
         stage = staged(StageOrder(str(its.path), plant), its.system, its.signs)

@@ -13,7 +13,7 @@ from typing import Any
 
 from rcsc.base.host.files.names import shown
 from rcsc.base.host.files.plain import read
-from rcsc.run.faults import faults_of, switch
+from rcsc.run.faults import Graded, faults_of, switch
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.stopped import Restorable
@@ -130,6 +130,20 @@ class Together:
     def switch(self, fault: str, *, on: bool) -> None:
         """Switch a fault on or off."""
         switch(self.others, fault, on=on)
+
+    @property
+    def grades(self) -> Mapping[str, tuple[float, float]]:
+        """The strengths of the plants' faults."""
+        return {
+            name: ends
+            for part in self.others
+            if isinstance(part, Graded)
+            for name, ends in part.grades.items()
+        }
+
+    def grade(self, fault: str, strength: float) -> None:
+        """Switch a fault on, with a strength."""
+        switch(self.others, f"{fault}={strength}", on=True)
 
     def _switch(self) -> None:
         """Switch on the faults of the row under way, and off those of the row before."""

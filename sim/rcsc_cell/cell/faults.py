@@ -1,16 +1,23 @@
 """Faults of a cell, for every plant; none by default."""
 
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, fields
 
 from rcsc_cell.cell.arm import Joints
 
 WEAK = 0.05
 """What a weak motor has left of its force."""
+USUAL: Mapping[str, float] = {"joint_stuck": 1.0, "late_ticks": 120.0, "shifted_mm": 30.0}
+"""How strong a switch is that is no yes or no, where nobody says: a joint, later than what is waited for, and beside the part."""
+GRADES: Mapping[str, tuple[float, float]] = {
+    "joint_stuck": (1.0, 6.0), "late_ticks": (1.0, 100_000.0), "shifted_mm": (-500.0, 500.0),
+}  # fmt: skip
+"""The lowest and the highest strength of each of these."""
 
 
 @dataclass(slots=True)
-class Faults:
-    """Switches, set and cleared at any cycle.
+class Faults(Collection[str]):
+    """Switches, set and cleared at any cycle; as a collection, their names.
 
     Attributes:
         robot_stuck: No joint moves.
@@ -51,6 +58,19 @@ class Faults:
     vise_stuck: bool = False
     vise_weak: bool = False
     vise_mute: bool = False
+
+    def __iter__(self) -> Iterator[str]:
+        return (switch.name for switch in fields(self))
+
+    def __len__(self) -> int:
+        return len(fields(self))
+
+    def __contains__(self, name: object) -> bool:
+        return name in tuple(self)
+
+    def set(self, name: str, strength: float) -> None:
+        """Set a switch: with 0 it is off, and one that is yes or no is on with anything else."""
+        setattr(self, name, type(getattr(self, name))(strength))
 
     def reachable(self, before: Joints, goal: Joints) -> Joints:
         """Return the goal, with stuck joints at their last goal; both in radians."""

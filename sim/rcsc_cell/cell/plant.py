@@ -15,7 +15,7 @@ from rcsc.base.host.files.plain import alike, plain, read
 from rcsc.run.plant.space import Space
 from rcsc.run.signature import Value, Values
 from rcsc_cell.cell.arm import Joints, plate
-from rcsc_cell.cell.faults import Faults
+from rcsc_cell.cell.faults import GRADES, USUAL, Faults
 from rcsc_cell.cell.fixture import MachineController, ViseController
 from rcsc_cell.cell.robot import FOLLOW, Robot
 from rcsc_cell.database.ask import Database
@@ -173,6 +173,19 @@ class Plant:
     def faults(self) -> Faults:
         """The faults of the mechanism."""
         return self.mechanism.faults
+
+    @property
+    def grades(self) -> Mapping[str, tuple[float, float]]:
+        """The strengths of those faults that are no yes or no."""
+        return GRADES
+
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switch a fault on, with its usual strength, or off."""
+        self.faults.set(fault, USUAL.get(fault, 1.0) if on else 0.0)
+
+    def grade(self, fault: str, strength: float) -> None:
+        """Switch a fault on, with a strength."""
+        self.faults.set(fault, strength)
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """Run one cycle of everything."""

@@ -14,6 +14,7 @@ from rcsc.run.system import System
 from rcsc.views.pages.report import Figure, Placement, Story
 from rcsc.views.pages.witness import RunWitness
 from rcsc_cell.cell.arm import margins_deg, solve
+from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.physical import Physical
 from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
@@ -51,6 +52,24 @@ class Timed:
     def space(self) -> SpaceOfPlant:
         """Return the plant's."""
         return self.inner.space()
+
+    @property
+    def faults(self) -> Faults:
+        """The plant's."""
+        return self.inner.faults
+
+    @property
+    def grades(self) -> Mapping[str, tuple[float, float]]:
+        """The plant's."""
+        return self.inner.grades
+
+    def switch(self, fault: str, *, on: bool) -> None:
+        """Switch a fault of the plant's on or off."""
+        self.inner.switch(fault, on=on)
+
+    def grade(self, fault: str, strength: float) -> None:
+        """Switch a fault of the plant's on, with a strength."""
+        self.inner.grade(fault, strength)
 
     def state(self) -> dict[str, object]:
         """Return the plant's."""

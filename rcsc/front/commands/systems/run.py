@@ -94,7 +94,7 @@ Examples:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Seed of the plant's random numbers; the same seed gives the same log.")  # fmt: skip
 @click.option("--fault", "faults", multiple=True, metavar="NAME",
-              help="A fault of the plant that is on from the first cycle (repeatable).")  # fmt: skip
+              help="A fault of the plant that is on from the first cycle (repeatable); NAME=STRENGTH where it has strengths.")  # fmt: skip
 @click.option("--cycles", type=click.IntRange(min=1), default=None, metavar="N",
               help=f"How many cycles at most; without a script {UNORDERED_TICKS}, if nobody says.")  # fmt: skip
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
