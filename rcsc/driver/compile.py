@@ -1,7 +1,8 @@
 """`rcsc compile`: the executors of every proved program."""
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,13 +10,13 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.code.emit import TARGETS, emitted
-from rcsc.code.emit.generated import stale, write
+from rcsc.code.emit.generated import lies_in, lying, stale, write
 from rcsc.code.emit.lower import lower
 from rcsc.code.emit.plan import Plan
 from rcsc.driver.pipeline import proved
-from rcsc.driver.settings import Conclusion, Settings
+from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
-from rcsc.lang.project import PROJECT_FILE, prefix, project_root
+from rcsc.lang.project import PROJECT_FILE, prefix, project_root, systems_above
 from rcsc.proof.solvers.options import Options
 from rcsc.run.description import BadDescription, description, places
 from rcsc.run.link import Linked, emit_system, linked, outward
@@ -102,6 +103,84 @@ def _folder(systems: tuple[Path, ...]) -> Path:
         names = " and ".join(f"`{folder}`" for folder in sorted(folders))
         raise BadDescription(f"the systems are to be compiled to {names}: choose one with --out")
     return Path(os.path.relpath(folders.pop())) if folders else Path("generated")
+
+
+@dataclass(frozen=True, slots=True)
+class CodeFound:
+    """The generated files of a program or system that are looked at.
+
+    Attributes:
+        files: Text by path below the generated folder; files of symbols as the tables give them.
+        folder: Where they lie; None where they were made just now.
+        made: Languages that the folder has nothing of, and that were made just now.
+        defensive: Whether they check their whole state.
+        stale: Each file that differs from what the tables give, or is missing.
+        lacking: C and Python that are missing or cannot be read; nothing runs without them.
+    """
+
+    files: Mapping[str, str]
+    folder: Path | None = None
+    made: tuple[str, ...] = ()
+    defensive: bool = False
+    stale: tuple[Diagnostic, ...] = ()
+    lacking: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """Where the code is, in words."""
+        if self.folder is None:
+            return "what the tables give now"
+        lie = " and ".join(str(self.folder / name) for name in TARGETS if name not in self.made)
+        now = "".join(f"; {TARGETS[name].title} as the tables give it now" for name in self.made)
+        return f"{lie}{' (defensive)' if self.defensive else ''}{now}"
+
+
+def code_of(
+    root: str, makes: Callable[[bool], Mapping[str, str]], wanted: CodeWanted, systems: Iterable[Path] = ()
+) -> CodeFound:
+    """Return the code of a program or system as it lies in the folder that is wanted, or else beside its project.
+
+    Args:
+        root: The root file of the program, or the description of the system.
+        makes: Gives its files as the tables give them now; asked whether defensive ones.
+        wanted: Which folder.
+        systems: Descriptions whose `generated` is looked into first.
+    """
+    usual = makes(False)
+    folder = wanted.folder or next((at for at in _beside(root, systems) if lies_in(usual, at)), None)
+    if wanted.anew or folder is None:
+        return CodeFound(usual)
+    found = _lying(usual, folder, defensive=False)
+    other = _lying(makes(True), folder, defensive=True) if found.stale else found
+    return found if other.stale else other
+
+
+def files_of(program: ProvedProgram, defensive: bool) -> dict[str, str]:
+    """Return the generated files of a program as its tables give them."""
+    return emitted(planned(program, defensive=defensive))
+
+
+def _lying(made: Mapping[str, str], folder: Path, *, defensive: bool) -> CodeFound:
+    """Hold what lies in a folder against what the tables give, language by language; of none of them all is missing."""
+    here = [name for name in TARGETS if (folder / name).is_dir()]
+    asked = {path: text for path, text in made.items() if path.partition("/")[0] in (here or TARGETS)}
+    texts, stale = lying(asked, str(folder))
+    symbols = {path: text for path, text in made.items() if path.endswith(".json")}
+    code = (path for path in asked if path.endswith((".c", ".h", ".py")))
+    missing = tuple(path for path in code if path not in texts)
+    now = tuple(name for name in TARGETS if here and name not in here)
+    return CodeFound({**made, **texts, **symbols}, folder, now, defensive, stale, missing)
+
+
+def _beside(root: str, systems: Iterable[Path]) -> Iterator[Path]:
+    """Yield the folders that may hold what was compiled from a root file, as seen from here."""
+    project = Path(project_root(root))
+    folders = []
+    for path in (*systems, *systems_above(root)):
+        with suppress(BadDescription):
+            folders.append(description(path).generated)
+    folders += [project / "generated", project / ".." / "generated", Path("generated")]
+    yield from dict.fromkeys(Path(os.path.relpath(folder)) for folder in folders)
 
 
 @dataclass(slots=True)

@@ -36,6 +36,19 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
+class CodeWanted:
+    """The generated code to look at: what lies in a folder, or what the tables give now.
+
+    Attributes:
+        folder: The generated folder; None for the one beside the project, if its files are there.
+        anew: Whether to look at no folder.
+    """
+
+    folder: Path | None = None
+    anew: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Conclusion:
     """A report, and a closing line for people."""
 

@@ -5,6 +5,7 @@ In: proved programs and their generated files. Out: what the suite found, and it
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from rcsc.base.diagnostics.codes import Code
@@ -14,14 +15,15 @@ from rcsc.base.host import children
 from rcsc.base.host.files import write_atomically
 from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import write
+from rcsc.code.testing.apart import Ended, apart
 from rcsc.code.testing.coverage.document import VectorSet
 from rcsc.code.testing.coverage.vector_set import figure, vector_set, write_vectors
 from rcsc.code.testing.inputs.snapshot import Missing
 from rcsc.code.testing.mutants import Opinion
 from rcsc.code.testing.suite import Proofs, SuiteOptions, run_suite
-from rcsc.driver.compile import Generated, planned, systems_in, tables_in
+from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
-from rcsc.driver.settings import Conclusion, Settings, TestEffort
+from rcsc.driver.settings import CodeWanted, Conclusion, Settings, TestEffort
 from rcsc.lang.model import Expr, Program, ProvedProgram, Snapshot, Table
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver
@@ -50,7 +52,7 @@ SAVED = Path("campaign")
 """Where an episode goes that breaks a property."""
 
 
-def test(settings: Settings, effort: TestEffort) -> Conclusion:
+def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion:
     """Prove every table, then test its executors against its meaning, the C of systems beside Python, and write vectors if asked.
 
     Raises:
@@ -63,18 +65,21 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
         return Conclusion(report, "nothing was tested: not everything is proved")
     diagnostics: list[Diagnostic] = []
     figures = []
-    for _, program in project.executable:
-        files = emitted(planned(program))
-        failures, text = _try_out(program.program, files, settings.options, effort, settings.progress)
-        diagnostics += failures
-        figures.append(text)
+    for root, program in project.executable:
+        found = code_of(root, partial(files_of, program), code, systems)
+        given = (program.program, found.files, settings.options, effort)
+        wrong, text = _tried(f"program `{program.program.name}`", found, _try_out, given, settings)
+        diagnostics += wrong
+        figures += [text, f"  tested: {found.words}"]
     for path in systems:
-        generated = _generated(path, project)
+        found = code_of(str(path), partial(_files, path, project), code, (path,))
+        generated = replace(_generated(path, project, found.defensive), files=dict(found.files))
         for trial in (_beside, _in_plant):
             settings.progress(f"running {path}")
-            wrong, text = trial(path, generated, effort)
+            wrong, text = _tried(f"system `{path}`", found, trial, (path, generated, effort), settings)
             diagnostics += wrong
-            figures.append(text)
+            figures += [text] if text not in figures else []
+        figures.append(f"  tested: {found.words}")
     if effort.vectors is not None or effort.sessions is not None:
         sets = [whole_vectors(program, settings) for _, program in project.executable]
         diagnostics += write_vectors(sets, effort.vectors, effort.sessions)
@@ -83,13 +88,37 @@ def test(settings: Settings, effort: TestEffort) -> Conclusion:
     return Conclusion(project.report(tuple(diagnostics)), "\n".join(figures))
 
 
-def _beside(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+Told = tuple[tuple[Diagnostic, ...], str]
+"""What a trial found, and a text of what was tried."""
+
+
+def _tried(
+    name: str, found: CodeFound, trial: Callable[..., Told], given: tuple[object, ...], settings: Settings
+) -> Told:
+    """Run a trial of some code; of code that is not what the tables give, in a process of its own, which it may end."""
+    if found.lacking:
+        return found.stale, f"{name}: not tested: {', '.join(found.lacking)} cannot be read"
+    if not found.stale:
+        return trial(*given, settings.progress)
+    tried = apart(trial, *given, progress=settings.progress)
+    if not isinstance(tried, Ended):
+        return (*found.stale, *tried[0]), tried[1]
+    message = f"the executors of {name} in `{found.folder}` do not run as the tables say: {tried.why}"
+    place = Label(found.stale[0].primary.span)
+    return (
+        *found.stale,
+        Diagnostic(Code.EXECUTORS_DISAGREE, message, place),
+    ), f"{name}: not tested to the end"
+
+
+def _beside(path: Path, generated: Generated, effort: TestEffort, progress: Callable[[str], None]) -> Told:
     """Run the C of a system beside the Python system; return the first difference, and a line on what was run."""
     if generated.clashes:
         return tuple(generated.clashes), ""
     whole = generated.systems[path]
     if reason := _alone(whole):
         return (), f"system {whole.word}: not run as a whole: {reason}"
+    progress(f"running {whole.word} in C and in Python")
     with children.scratch("systems") as folder:
         write(generated.files, str(folder))
         described = replace(description(path), generated=folder)
@@ -109,22 +138,27 @@ def _beside(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple
     return (Diagnostic(Code.EXECUTORS_DISAGREE, message, Label(Span(str(path), 0, 0))),), ""
 
 
-def _generated(path: Path, project: Proved) -> Generated:
+def _generated(path: Path, project: Proved, defensive: bool) -> Generated:
     """Make the executors of a system's programs, and the C of the whole."""
-    generated = Generated(tuple(TARGETS), defensive=False)
+    generated = Generated(tuple(TARGETS), defensive)
     for root, program in project.executable:
         generated.add_program(root, program)
     generated.add_system(path)
     return generated
 
 
-def _in_plant(path: Path, generated: Generated, effort: TestEffort) -> tuple[tuple[Diagnostic, ...], str]:
+def _files(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
+    return _generated(path, project, defensive).files
+
+
+def _in_plant(path: Path, generated: Generated, effort: TestEffort, progress: Callable[[str], None]) -> Told:
     """Run drawn episodes of a system in its plant; return the first that breaks a property, shrunk and saved, and a line on all runs."""
     if generated.clashes:
         return (), ""
     whole = generated.systems[path]
     extern = any(p.extern for program in whole.programs for p in program.plan.program.procedures)
     kinds = KINDS[1:] if extern else KINDS
+    progress(f"running {whole.word} in episodes")
     with children.scratch("episodes") as folder:
         write(generated.files, str(folder))
         try:
@@ -202,7 +236,7 @@ def _try_out(
     options: Options,
     effort: TestEffort,
     progress: Callable[[str], None],
-) -> tuple[tuple[Diagnostic, ...], str]:
+) -> Told:
     """Run the suite on one program; return its findings and its counts."""
     asked = SuiteOptions(
         effort.examples,

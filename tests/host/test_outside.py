@@ -198,6 +198,7 @@ BEGUN = (
 NO_PROCESS = {
     ("rcsc/run/processes/block.py", "multiprocessing"),  # shared memory, no process
     ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
+    ("rcsc/code/testing/apart.py", "multiprocessing"),  # likewise
     ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
     (
         "rcsc/run/campaign/worker_pool.py",

@@ -22,7 +22,9 @@ def beside_python(path: Path) -> tuple[list[tuple[Code, str]], str]:
     """What is reported of a system's C, and the figure."""
     given = (str(path),)
     project = proved(settings.Settings(tables_in(given, (path,)), Options()))
-    diagnostics, figure = trials._beside(path, trials._generated(path, project), settings.TestEffort(60))
+    diagnostics, figure = trials._beside(
+        path, trials._generated(path, project, False), settings.TestEffort(60), settings.silent
+    )
     return [(found.code, found.message) for found in diagnostics], figure
 
 
@@ -33,6 +35,17 @@ def test_a_system_is_run_as_a_whole(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "table t: 2 of 2 lines reached" in told
     assert "system whole: C and Python the same in 30 ticks: " in told
     assert not (tmp_path / "generated").exists()
+
+
+def test_the_c_that_lies_there_is_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An edit of the system's C that divides by zero ends the process that runs it, and not the command."""
+    path = written(tmp_path, {"a": 20, "b": 10}, BUFFERS)
+    assert run(["compile", "-q", str(path)]) == 0
+    edit_file(tmp_path / "generated/c/whole.c", ("s->out.who.y = s->a.y;\n}", "s->out.who.y = 1 / (s->a.y - s->a.y);\n}"))  # fmt: skip
+    assert run(["test", "-q", "--examples", "6", "--mutants", "0", "--no-cortex", str(path)]) == 1
+    told = "".join(capsys.readouterr())
+    assert "whole.c` differs from the code of the tables" in told
+    assert "the process ended by SIGFPE, while running whole in C and in Python" in told
 
 
 def misspelt(*edits: tuple[str, str]) -> Callable[[Linked], dict[str, str]]:

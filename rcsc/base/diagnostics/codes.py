@@ -1465,8 +1465,9 @@ class Code(StrEnum):
     """
     STALE = """RCS501: the generated files are not fresh
 
-    `rcsc compile --check` found that `generated/` is not what the tables now give: a file differs or is missing. Run `rcsc compile` and
-    commit the result. Generated files are never edited by hand.
+    `rcsc compile --check`, `rcsc test` or `rcsc evidence` found that `generated/` is not what the tables now give: a file differs or is
+    missing. What is proved speaks of the files that the tables give, and not of it. Run `rcsc compile` and commit the result. Generated
+    files are never edited by hand. `rcsc test --anew` tests what the tables give, whatever lies there.
     """
     NOT_WRITTEN = """RCS502: a file could not be written
 
@@ -1499,8 +1500,8 @@ class Code(StrEnum):
     """
     EXECUTORS_DISAGREE = """RCS601: the executors disagree
 
-    On the same input the interpreter, the Python executor and the C executor gave different lines, states or faults. That is a bug in
-    rcsc or, for an extern procedure, in one of its two implementations.
+    On the same input the interpreter, the Python executor and the C executor gave different lines, states or faults, or one of them
+    ended its process. Where a generated file was edited, which is told as RCS501, that is why; else it is a bug in rcsc.
 
     It arises in `rcsc test`, which shows the simplest input that it finds.
     """
@@ -1516,8 +1517,8 @@ class Code(StrEnum):
     MATCHER_DIFFERS = """RCS604: the C matcher is not shown equal to the table
 
     The check of the emitted masks against the table, for every value of every variable, found a difference, or a model checker refuted
-    that a C function does what the tables say. What a tool could not decide is a figure of `rcsc test`, and no finding. Please report
-    it: this is a bug in rcsc.
+    that a C function does what the tables say. What a tool could not decide is a figure of `rcsc test`, and no finding. Where no
+    generated file was edited, which is told as RCS501, this is a bug in rcsc: please report it.
     """
     EVIDENCE_LACKS = """RCS605: evidence is not whole
 

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import click
 
 from rcsc.base.host.files.read import standard_input
-from rcsc.driver.settings import Settings
+from rcsc.driver.settings import CodeWanted, Settings
 from rcsc.front.commands.shared.show import Color, Output, OutputForm, Progress
 from rcsc.lang.project import MOST_BYTES
 from rcsc.proof.solvers.options import Options, SolverChoice
@@ -95,6 +95,27 @@ def proving(command: Command) -> Command:
             jobs=jobs or cores(),
         )
         return command(*args, options=options, use_cache=not no_cache, **kwargs)
+
+    return wrapped
+
+
+def looking(command: Command) -> Command:
+    """Add the options for the generated code that is looked at; the command gets them as `code`."""
+
+    @click.option(
+        "--generated",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        default=None,
+        metavar="FOLDER",
+        help="The folder of the generated C and Python to look at, as `rcsc compile --out` names it; else the one that the system "
+        "names, else `generated` in the project, beside it or here, if it holds what was compiled of these tables.",
+    )
+    @click.option("--anew", is_flag=True, help="Look at what the tables give now, and not at any folder.")
+    @wraps(command)
+    def wrapped(*args: Any, generated: Path | None, anew: bool, **kwargs: Any) -> int:
+        if generated is not None and anew:
+            raise click.UsageError("--generated and --anew do not go together")
+        return command(*args, code=CodeWanted(generated, anew), **kwargs)
 
     return wrapped
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from rcsc.driver.settings import TestEffort
+from rcsc.driver.settings import CodeWanted, TestEffort
 from rcsc.driver.trials import test
-from rcsc.front.commands.shared.options import PATHS, proving, settings_of, showing
+from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
 from rcsc.front.commands.shared.show import Output, finish
 from rcsc.proof.solvers.options import Options
 
@@ -16,6 +16,7 @@ from rcsc.proof.solvers.options import Options
     epilog="""\b
 Examples:
   rcsc test tables/task             interpreter = Python = C, every line reached
+  rcsc test --generated out a.rcs   the C and the Python that lie in out/c and out/python
   rcsc test --deep acquire.rcs      also prove the C, and mutate it; minutes
   rcsc test robot/system.toml       a system: its levels, the C of the whole, and episodes in its plant
   rcsc test --vectors v.json a.rcs  also write test vectors that cover the whole C
@@ -38,13 +39,18 @@ Examples:
               "JSON, by its ending.")  # fmt: skip
 @click.option("--sessions", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Write the sequences of cycles that were drawn for the vectors to FILE, as CSV or JSON.")  # fmt: skip
+@looking
 @proving
 @showing
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paths: tuple[str, ...], examples: int, mutants: int, deep: bool, esbmc: float | None, cortex: bool,
-    vectors: Path | None, sessions: Path | None, options: Options, use_cache: bool, output: Output,
+    vectors: Path | None, sessions: Path | None, code: CodeWanted, options: Options, use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Test what is generated: interpreter = Python = C on the same inputs and over cycles.
+
+    Tested are the C and the Python that lie in the generated folder: with --generated in the one that it names, else in the one
+    where `rcsc compile` put them, if they are there; else, and with --anew, what the tables give now. The output says which. A file
+    that differs from what the tables give, or is missing, is a finding; what it does wrong is another.
 
     Inputs lean on the edges of the declarations. Every line is reached, and the C matcher's masks are checked
     against the table for every value of every variable. That takes seconds; --deep takes minutes. What a tool
@@ -52,8 +58,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     beside the Python system, with outside values at the edges of their ranges, restarts and refused inputs: every value after
     every tick is compared. And it is run in its plant, in a tenth as many episodes as --examples says, with orders and faults that
     Hypothesis draws: lost, late, doubled and stale buffers, restarts, readings at edges, faults of the plant. An episode that breaks a
-    property is made small and saved in campaign/ for `rcsc campaign --again`. The plant is imported and run; else extern
-    procedures are stand-ins, and nothing of the user's is imported or linked. Needs a C compiler.
+    property is made small and saved in campaign/ for `rcsc campaign --again`. The generated files and the
+    plant are run; extern procedures are stand-ins, and nothing else of the user's is imported or linked. Needs a C compiler.
     Vectors are complete states with their inputs: each can be played on its own. What no vector reaches stands in the JSON, with the
     proof that nothing can, or that none was found.
     """
@@ -67,5 +73,5 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         vectors=vectors,
         sessions=sessions,
     )
-    conclusion = test(settings_of(options, use_cache, output, paths), effort)
+    conclusion = test(settings_of(options, use_cache, output, paths), effort, code)
     return finish(conclusion.report, "test", output, conclusion.closing)
