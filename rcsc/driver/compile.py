@@ -112,7 +112,7 @@ class CodeFound:
     Attributes:
         files: Text by path below the generated folder; files of symbols as the tables give them.
         folder: Where they lie; None where they were made just now.
-        made: Languages that the folder has nothing of, and that were made just now.
+        lie: Languages that lie there; those that it has nothing of were made just now.
         defensive: Whether they check their whole state.
         stale: Each file that differs from what the tables give, or is missing.
         lacking: C and Python that are missing or cannot be read; nothing runs without them.
@@ -120,7 +120,7 @@ class CodeFound:
 
     files: Mapping[str, str]
     folder: Path | None = None
-    made: tuple[str, ...] = ()
+    lie: tuple[str, ...] = ()
     defensive: bool = False
     stale: tuple[Diagnostic, ...] = ()
     lacking: tuple[str, ...] = ()
@@ -130,8 +130,9 @@ class CodeFound:
         """Where the code is, in words."""
         if self.folder is None:
             return "what the tables give now"
-        lie = " and ".join(str(self.folder / name) for name in TARGETS if name not in self.made)
-        now = "".join(f"; {TARGETS[name].title} as the tables give it now" for name in self.made)
+        lie = " and ".join(str(self.folder / name) for name in self.lie)
+        made = [name for name in _languages(self.files) if name not in self.lie]
+        now = "".join(f"; {TARGETS[name].title} as the tables give it now" for name in made)
         return f"{lie}{' (defensive)' if self.defensive else ''}{now}"
 
 
@@ -155,21 +156,25 @@ def code_of(
     return found if other.stale else other
 
 
-def files_of(program: ProvedProgram, defensive: bool) -> dict[str, str]:
-    """Return the generated files of a program as its tables give them."""
-    return emitted(planned(program, defensive=defensive))
+def files_of(program: ProvedProgram, targets: Collection[str], defensive: bool) -> dict[str, str]:
+    """Return the generated files of a program in some languages, as its tables give them."""
+    return emitted(planned(program, defensive=defensive), targets)
 
 
 def _lying(made: Mapping[str, str], folder: Path, *, defensive: bool) -> CodeFound:
     """Hold what lies in a folder against what the tables give, language by language; of none of them all is missing."""
-    here = [name for name in TARGETS if (folder / name).is_dir()]
-    asked = {path: text for path, text in made.items() if path.partition("/")[0] in (here or TARGETS)}
+    lie = tuple(name for name in _languages(made) if (folder / name).is_dir()) or _languages(made)
+    asked = {path: text for path, text in made.items() if path.partition("/")[0] in lie}
     texts, stale = lying(asked, str(folder))
     symbols = {path: text for path, text in made.items() if path.endswith(".json")}
     code = (path for path in asked if path.endswith((".c", ".h", ".py")))
     missing = tuple(path for path in code if path not in texts)
-    now = tuple(name for name in TARGETS if here and name not in here)
-    return CodeFound({**made, **texts, **symbols}, folder, now, defensive, stale, missing)
+    return CodeFound({**made, **texts, **symbols}, folder, lie, defensive, stale, missing)
+
+
+def _languages(files: Iterable[str]) -> tuple[str, ...]:
+    folders = {path.partition("/")[0] for path in files}
+    return tuple(name for name in TARGETS if name in folders)
 
 
 def _beside(root: str, systems: Iterable[Path]) -> Iterator[Path]:

@@ -66,7 +66,7 @@ def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion
     diagnostics: list[Diagnostic] = []
     figures = []
     for root, program in project.executable:
-        found = code_of(root, partial(files_of, program), code, systems)
+        found = code_of(root, partial(files_of, program, TARGETS), code, systems)
         given = (program.program, found.files, settings.options, effort)
         wrong, text = _tried(f"program `{program.program.name}`", found, _try_out, given, settings)
         diagnostics += wrong

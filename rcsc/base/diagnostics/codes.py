@@ -1543,6 +1543,12 @@ class Code(StrEnum):
     `rcsc trace --against FILE` holds a kept matrix against these tables and the code that is made of them now. It is of another
     version where the meaning of a program or a byte of a generated file differs. Make it anew, and review what changed with `rcsc diff`.
     """
+    DOSSIER_OLD = """RCS609: a dossier of other files
+
+    `rcsc evidence --check FOLDER` holds the digests of a dossier against the files of this checkout: the tables, the generated C, and the
+    dossier's own vectors and reports. A file that differs, is missing, or is new is named. Make the dossier anew, or fetch the version
+    that it is of; its `index.json` says when and by whom it was made.
+    """
     LOG_UNREADABLE = """RCS701: a log cannot be read
 
     The file is not there, is no MCAP file, or holds no run that rcsc recorded: a name in it is none, or it unpacks to more than a log

@@ -6,6 +6,7 @@ time limit and, where asked, a memory limit.
 
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -46,6 +47,15 @@ def ending(ran: Ran, timeout_s: float) -> str:
         return f"no answer in {timeout_s:.0f} s"
     said = (ran.out + ran.err).strip()[-400:]
     return f"ended with status {ran.status}{f': {said}' if said else ' and said nothing'}"
+
+
+def version_of(*command: str) -> str:
+    """Return the line in which a tool tells its version; "" where it is not installed, or tells none."""
+    try:
+        ran = run_command(command, Path(), 60.0)
+    except OSError:
+        return ""
+    return next((line.strip() for line in ran.out.splitlines() if re.search(r"\d+\.\d+", line)), "")
 
 
 def write_c(files: Mapping[str, str], place: Path) -> list[str]:

@@ -14,7 +14,8 @@ anything here. What it costs: seconds to minutes a program, by kind.
 
 Rooms: `misra` (MISRA C:2012, guideline by guideline), `whole` (the C that links a system).
 
-Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen).
+Modules: `kind` (what a kind takes and gives), `kinds` (their names), `collect` (all that was asked for, on one screen),
+`dossier` (digests, versions, date; a kept dossier held against a checkout).
 Kinds: `coverage` (vectors of the whole C, measured in `llvm`; why the rest is `out_of_reach`), `runtime` (Frama-C's EVA),
 `analysers` (compilers, analysers, sanitizers); `harness` is the C that the last two give their tools,
 `model_check` (ESBMC). `resources` (what each

@@ -17,12 +17,12 @@ from pathlib import Path
 
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files import csv_text
-from rcsc.base.host.tools import ending, run_command, write_c
+from rcsc.base.host.tools import ending, run_command, version_of, write_c
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import Kind as Role
 from rcsc.lang.model import Program, Real, Scalar
 from rcsc.views.evidence.harness import bounds, calls, stand_ins
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject, versions_of
 
 TIMEOUT_S = 900.0
 LOOK_S = 300.0
@@ -371,9 +371,7 @@ def _commands() -> Iterator[str]:
     yield ""
     for name, command in (*_static("FILE.c"), *_sanitized("FILE.c")):
         if shutil.which(command[0]):
-            version = run_command([command[0], "--version"], Path(), 60.0).out.split("\n")
-            told = next((line.strip() for line in version if re.search(r"\d+\.\d+", line)), "")
-            yield f"- {name} ({told}): `{' '.join(command)}`"
+            yield f"- {name} ({version_of(command[0], '--version')}): `{' '.join(command)}`"
 
 
 def _shortfalls(reports: list[Report]) -> Iterator[Shortfall]:
@@ -388,5 +386,7 @@ def _shortfalls(reports: list[Report]) -> Iterator[Shortfall]:
 
 
 KIND = Kind(
-    "compilers, analysers and sanitizers find nothing in the C, or what is listed with its reason", collect
+    "compilers, analysers and sanitizers find nothing in the C, or what is listed with its reason",
+    collect,
+    lambda: versions_of(*([tool, "--version"] for tool in TOOLS)),
 )

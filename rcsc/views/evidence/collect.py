@@ -9,12 +9,14 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.files import write_atomically
-from rcsc.code.emit import emitted
-from rcsc.driver.compile import Generated, planned, systems_in, tables_in
+from rcsc.code.testing.apart import Ended, apart
+from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
-from rcsc.driver.settings import Conclusion, Settings
+from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
-from rcsc.views.evidence.kind import Evidence, Subject
+from rcsc.lang.resolve import closure
+from rcsc.views.evidence.dossier import RECORD, Making, Part, heading, record, sha256
+from rcsc.views.evidence.kind import Evidence, Shortfall, Subject
 from rcsc.views.evidence.kinds import KINDS
 from rcsc.views.evidence.whole import kinds as whole
 from rcsc.views.evidence.whole.kinds import Whole
@@ -22,13 +24,18 @@ from rcsc.views.evidence.whole.kinds import Whole
 INDEX = "index.md"
 
 
-def collect(settings: Settings, kinds: Collection[str], folder: Path) -> Conclusion:
+def collect(
+    settings: Settings, kinds: Collection[str], folder: Path, code: CodeWanted, by: str, date: str
+) -> Conclusion:
     """Prove every table, make each kind of evidence of every program, and write it.
 
     Args:
         settings: Which tables and systems, and how they are proved.
         kinds: Names among `KINDS`.
-        folder: Where the files go: `folder/PROGRAM/KIND/...`, with an index. Files of the same names are replaced.
+        folder: Where the files go: `folder/PROGRAM/KIND/...`, with an index and a record. Files of the same names are replaced.
+        code: Which generated files are looked at.
+        by: Who runs the command.
+        date: When.
 
     Raises:
         BadDescription: A system is not in order.
@@ -37,50 +44,90 @@ def collect(settings: Settings, kinds: Collection[str], folder: Path) -> Conclus
     report = project.report()
     if report.failed:
         return Conclusion(report, "no evidence was made: not everything is proved")
-    made: dict[str, dict[str, Evidence]] = {}
+    made: dict[str, Part] = {}
     diagnostics: list[Diagnostic] = []
     names = [name for name in KINDS if name in kinds]
-    roots: dict[str, str] = {}
-    for root, looks in _subjects(settings, project, diagnostics):
-        if (other := roots.setdefault(looks.name.casefold(), root)) != root:
-            diagnostics.append(_same_name(looks.name, root, other))
+    for looks in _subjects(settings, project, code, diagnostics):
+        if other := next(
+            (part for name, part in made.items() if name.casefold() == looks.name.casefold()), None
+        ):
+            diagnostics.append(_same_name(looks.name, looks.root, other.source))
             continue
-        of_one = made[looks.name] = {}
-        for name in names:
-            settings.progress(f"{root}: {name}")
-            of_one[name] = looks.at(name)
-            diagnostics += _findings(root, name, of_one[name])
+        of_one: dict[str, Evidence] = {}
+        for name in names if not looks.code.lacking else ():
+            settings.progress(f"{looks.root}: {name}")
+            of_one[name] = looks.at(name, settings.progress)
+            diagnostics += _findings(looks.root, name, of_one[name])
+        diagnostics += looks.code.stale
+        made[looks.name] = Part(looks.root, looks.tables, looks.code, of_one)
     settings.progress("")
-    diagnostics += _written(folder, made)
+    making = Making(by, date, settings, {name: KINDS[name].versions() for name in names})
+    diagnostics += _written(folder, making, made)
     return Conclusion(project.report(tuple(diagnostics)), _closing(folder, made))
+
+
+Look = Callable[[str, Callable[[str], None]], Evidence]
 
 
 @dataclass(frozen=True, slots=True)
 class _Looks:
-    """A program or system to make evidence of: its name, and its evidence by kind."""
+    """A program or system to make evidence of: its name, root and files, its code, and its evidence by kind."""
 
     name: str
-    at: Callable[[str], Evidence]
+    root: str
+    tables: tuple[str, ...]
+    code: CodeFound
+    look: Look
+
+    def at(self, kind: str, progress: Callable[[str], None]) -> Evidence:
+        """Make evidence of a kind; of code that is not what the tables give, in a process of its own, which it may end."""
+        if not self.code.stale:
+            return self.look(kind, progress)
+        made = apart(self.look, kind, progress=progress, silent_s=LONGEST_S)
+        return Evidence((), shortfalls=(Shortfall(self.name, made.why),)) if isinstance(made, Ended) else made
 
 
-def _subjects(settings: Settings, project: Proved, clashes: list[Diagnostic]) -> Iterator[tuple[str, _Looks]]:
-    """Yield every program by its root, then every system by its description; put systems without C among `clashes`."""
+LONGEST_S = 4000.0
+"""Seconds in which a kind tells of no progress, at most: twice the longest time limit of a tool."""
+
+
+def _subjects(
+    settings: Settings, project: Proved, code: CodeWanted, clashes: list[Diagnostic]
+) -> Iterator[_Looks]:
+    """Yield every program, then every system; put systems without C among `clashes`."""
+    systems = tuple(systems_in(settings.paths))
     for root, program in project.executable:
-        subject = _subject(program, settings)
-        yield root, _Looks(program.program.name, partial(_looked, subject))
-    for path in systems_in(settings.paths):
-        generated = Generated(("c",), defensive=False)
-        for root, program in project.executable:
-            generated.add_program(root, program)
-        generated.add_system(path)
+        found = code_of(root, partial(files_of, program, ("c",)), code, systems)
+        subject = _subject(program, found, settings)
+        tables = tuple(sorted(name for name in closure(root, project.loaded) if Path(name).is_file()))
+        yield _Looks(program.program.name, root, tables, found, partial(_looked, subject))
+    for path in systems:
+        generated = _generated(path, project)
         clashes += generated.clashes
         if not generated.clashes:
-            system = Whole(generated.systems[path], generated.files, settings.progress)
-            yield str(path), _Looks(system.system.word, partial(whole.collect, system))
+            found = code_of(str(path), partial(_c_of, path, project), code, (path,))
+            system = Whole(generated.systems[path], found.files)
+            yield _Looks(system.system.word, str(path), (str(path),), found, partial(_whole, system))
 
 
-def _looked(subject: Subject, kind: str) -> Evidence:
-    return KINDS[kind].collect(subject)
+def _generated(path: Path, project: Proved, defensive: bool = False) -> Generated:
+    generated = Generated(("c",), defensive)
+    for root, program in project.executable:
+        generated.add_program(root, program)
+    generated.add_system(path)
+    return generated
+
+
+def _c_of(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
+    return _generated(path, project, defensive).files
+
+
+def _looked(subject: Subject, kind: str, progress: Callable[[str], None]) -> Evidence:
+    return KINDS[kind].collect(replace(subject, progress=progress))
+
+
+def _whole(system: Whole, kind: str, progress: Callable[[str], None]) -> Evidence:
+    return whole.collect(replace(system, progress=progress), kind)
 
 
 def _of_tables(settings: Settings) -> Settings:
@@ -88,9 +135,8 @@ def _of_tables(settings: Settings) -> Settings:
     return replace(settings, paths=tables_in(settings.paths, tuple(systems_in(settings.paths))))
 
 
-def _subject(program: ProvedProgram, settings: Settings) -> Subject:
-    plan = planned(program)
-    return Subject(program, plan, emitted(plan), settings.options, settings.progress)
+def _subject(program: ProvedProgram, found: CodeFound, settings: Settings) -> Subject:
+    return Subject(program, planned(program, defensive=found.defensive), found.files, settings.options)
 
 
 def _same_name(name: str, root: str, other: str) -> Diagnostic:
@@ -112,15 +158,11 @@ def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:
         yield Diagnostic(Code.EVIDENCE_LACKS, message, Label(Span(root, 0, 0)), notes=notes)
 
 
-def _written(folder: Path, made: Mapping[str, Mapping[str, Evidence]]) -> Iterator[Diagnostic]:
-    """Write every file and the index; yield a diagnostic for each that the operating system refuses."""
-    files = {
-        f"{program}/{kind}/{path}": text
-        for program, kinds in made.items()
-        for kind, evidence in kinds.items()
-        for path, text in evidence.files.items()
-    }
-    for path, text in {**files, INDEX: _index(made)}.items():
+def _written(folder: Path, making: Making, made: Mapping[str, Part]) -> Iterator[Diagnostic]:
+    """Write every file, the index and the record; yield a diagnostic for each that the operating system refuses."""
+    files = {f"{name}/{path}": text for name, part in made.items() for path, text in part.files.items()}
+    index = _index(making, made)
+    for path, text in {**files, INDEX: index, RECORD: record(making, made, index)}.items():
         try:
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             write_atomically(folder / path, text.encode())
@@ -132,15 +174,19 @@ def _written(folder: Path, made: Mapping[str, Mapping[str, Evidence]]) -> Iterat
             )
 
 
-def _index(made: Mapping[str, Mapping[str, Evidence]]) -> str:
-    """Return a page with the results of each program and kind, the shortfalls, and links to the files."""
-    parts = ["# Evidence", ""]
-    for program, kinds in made.items():
-        parts += [f"## {program}", ""]
-        for kind, evidence in kinds.items():
+def _index(making: Making, made: Mapping[str, Part]) -> str:
+    """Return a page: how it was made, of which files; of each program and kind the results, the shortfalls, and links to the files."""
+    parts = ["# Evidence", "", *heading(making)]
+    for name, part in made.items():
+        parts += [f"## {name}", "", f"Looked at: {part.code.words}.", "", "| C | SHA-256 |", "| --- | --- |"]
+        parts += [f"| {path} | `{sha256(text)}` |" for path, text in sorted(part.c.items())]
+        parts.append("")
+        for kind, evidence in part.kinds.items():
             parts += [f"### {kind}: {KINDS[kind].summary}", ""]
             parts += [f"- {line}" for line in _told(evidence)]
-            parts += [f"- [{path}]({program}/{kind}/{path})" for path in evidence.files]
+            parts += [
+                f"- [{path}]({name}/{kind}/{path}) `{sha256(text)}`" for path, text in evidence.files.items()
+            ]
             parts.append("")
     return "\n".join(parts)
 
@@ -152,11 +198,13 @@ def _told(evidence: Evidence) -> Iterator[str]:
     yield from (f"lacks: {short.where}: {short.what}" for short in evidence.shortfalls)
 
 
-def _closing(folder: Path, made: Mapping[str, Mapping[str, Evidence]]) -> str:
+def _closing(folder: Path, made: Mapping[str, Part]) -> str:
     lines = [
-        f"{program}: {line}"
-        for program, kinds in made.items()
-        for evidence in kinds.values()
-        for line in evidence.figures
+        f"{name}: {line}"
+        for name, part in made.items()
+        for line in (
+            f"evidence of {part.code.words}",
+            *(f for made in part.kinds.values() for f in made.figures),
+        )
     ]
     return "\n".join([*lines, f"the evidence is in {folder / INDEX}"])

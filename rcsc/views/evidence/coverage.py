@@ -10,7 +10,7 @@ from rcsc.code.testing.coverage.harness import vectors_c
 from rcsc.code.testing.coverage.marks import marked
 from rcsc.code.testing.coverage.vector_set import defended, figure, vector_set
 from rcsc.driver.trials import proofs
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject, versions_of
 from rcsc.views.evidence.llvm import Measured, Tools, measured, tools
 from rcsc.views.evidence.out_of_reach import Missed, Reasons
 
@@ -112,4 +112,11 @@ def _report(llvm: Tools, document: VectorSet, seen: Measured, missed: Sequence[M
     return "\n".join(lines) + "\n"
 
 
-KIND = Kind("vectors, and their coverage of statements, branches and MC/DC in the C", collect)
+def _versions() -> dict[str, str]:
+    llvm = tools()
+    if isinstance(llvm, Absent):
+        return {"clang": ABSENT}
+    return versions_of(*([tool, "--version"] for tool in (llvm.clang, llvm.profdata, llvm.cov)))
+
+
+KIND = Kind("vectors, and their coverage of statements, branches and MC/DC in the C", collect, _versions)

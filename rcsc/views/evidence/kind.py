@@ -1,10 +1,13 @@
 """What a kind of evidence takes and gives."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
+from rcsc.base.host.tools import version_of
 from rcsc.code.emit import emitted
 from rcsc.code.emit.plan import Plan
+from rcsc.driver.settings import silent
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.proof.solvers.options import Options
 
@@ -14,7 +17,7 @@ class Subject:
     """A proved program, and its emitted files.
 
     Attributes:
-        files: The emitted files, text by path below the generated folder.
+        files: The generated files that are looked at, text by path below the generated folder.
         options: The options of proofs, where a kind makes some.
         progress: Called with each step.
     """
@@ -23,7 +26,7 @@ class Subject:
     plan: Plan
     files: Mapping[str, str]
     options: Options
-    progress: Callable[[str], None] = field(default=lambda _: None)
+    progress: Callable[[str], None] = silent
 
     @property
     def program(self) -> Program:
@@ -31,7 +34,7 @@ class Subject:
         return self.proved.program
 
     def defensive(self) -> "Subject":
-        """Return the same program with the C that trusts no state: `rcsc compile --defensive`."""
+        """Return the same program with the C that trusts no state, as its tables give it: `rcsc compile --defensive`."""
         plan = replace(self.plan, defensive=True)
         return replace(self, plan=plan, files=emitted(plan, ("c",)))
 
@@ -73,7 +76,17 @@ class Kind:
     Attributes:
         summary: Its subject in a few words, for the help and the index.
         collect: Makes it for one program.
+        versions: Asks its tools, by name, for their versions; `ABSENT` of one that is not installed.
     """
 
     summary: str
     collect: Callable[[Subject], Evidence]
+    versions: Callable[[], Mapping[str, str]] = dict
+
+
+ABSENT = "not installed"
+
+
+def versions_of(*commands: Sequence[str]) -> dict[str, str]:
+    """Return what tools tell of their versions, by name."""
+    return {Path(command[0]).name: version_of(*command) or ABSENT for command in commands}

@@ -12,7 +12,7 @@ from rcsc.base.host.tools import ESBMC_PACKAGE, ESBMC_VERSION, Absent, esbmc
 from rcsc.code.testing.esbmc import MOST_LINES, EsbmcAnswer, EsbmcVerdict, prove_function, too_large
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.code.testing.executors.targets import targets
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject, versions_of
 
 QUESTION_S = 20.0
 """Time limit of ESBMC for one question, in seconds."""
@@ -67,4 +67,11 @@ def _shortfalls(verdicts: tuple[EsbmcVerdict, ...]) -> Iterator[Shortfall]:
             yield Shortfall(verdict.function, f"{verdict.answer}: {verdict.detail}")
 
 
-KIND = Kind("ESBMC: the C equals the tables, with admission and procedures (minutes a program)", collect)
+def _versions() -> dict[str, str]:
+    found = esbmc()
+    return {"esbmc": ABSENT} if isinstance(found, Absent) else versions_of([found, "--version"])
+
+
+KIND = Kind(
+    "ESBMC: the C equals the tables, with admission and procedures (minutes a program)", collect, _versions
+)

@@ -23,7 +23,7 @@ from rcsc.code.testing.executors.externs import STAND_INS, c_stand_ins, externs
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject, versions_of
 from rcsc.views.evidence.processors.assembly import (
     Assembly,
     Bounds,
@@ -94,7 +94,15 @@ def collect(subject: Subject) -> Evidence:
     return Evidence(tuple(_figures(needs)), files, tuple(short))
 
 
-KIND = Kind("stack, code and instructions of each function, on emulated Cortex-M and RISC-V", collect)
+def _versions() -> dict[str, str]:
+    return versions_of(
+        *([tool, "--version"] for board in BOARDS for tool in (board.compiler[0], board.emulator[0]))
+    )
+
+
+KIND = Kind(
+    "stack, code and instructions of each function, on emulated Cortex-M and RISC-V", collect, _versions
+)
 
 
 def measure(board: Board, plan: Plan, files: Mapping[str, str]) -> list[Need] | BuildFailed:

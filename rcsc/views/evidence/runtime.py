@@ -34,7 +34,7 @@ from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
 from rcsc.views.evidence.harness import bounds, calls, stand_ins
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject
 
 PACKAGE = "frama-c-base"
 STATES = 1000
@@ -302,4 +302,10 @@ def line_of(text: str, number: int) -> str:
     return ""
 
 
-KIND = Kind("Frama-C's EVA: every index, division, conversion and access of the C is safe", collect)
+def _versions() -> dict[str, str]:
+    return {"frama-c": version() or ABSENT}
+
+
+KIND = Kind(
+    "Frama-C's EVA: every index, division, conversion and access of the C is safe", collect, _versions
+)

@@ -13,8 +13,17 @@ from enum import StrEnum
 from pathlib import Path
 
 from rcsc.base.host.files import csv_text, read
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
-from rcsc.views.evidence.misra.cppcheck import MISSING, OWN, UNGUARDED, Checked, Finding, check, installed
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.misra.cppcheck import (
+    MISSING,
+    OWN,
+    UNGUARDED,
+    Checked,
+    Finding,
+    check,
+    engine,
+    installed,
+)
 from rcsc.views.evidence.misra.deviations import Deviation, explained, own_findings
 from rcsc.views.evidence.misra.guidelines import Category, Guideline, guidelines
 from rcsc.views.evidence.misra.words import RULES
@@ -159,7 +168,13 @@ def evidence_of(files: Mapping[str, str]) -> Evidence:
     return Evidence((figure,), tables, tuple(_shortfalls(made)))
 
 
-KIND = Kind("compliance with MISRA C:2012, guideline by guideline, each deviation with its place", collect)
+def _versions() -> dict[str, str]:
+    return {"cppcheck": engine() or ABSENT}
+
+
+KIND = Kind(
+    "compliance with MISRA C:2012, guideline by guideline, each deviation with its place", collect, _versions
+)
 
 
 def _shortfalls(made: Summary) -> Iterator[Shortfall]:

