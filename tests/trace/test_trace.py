@@ -1,9 +1,11 @@
 """`rcsc trace`: every line of generated code comes from somewhere, both ways agree, and what does not fit is told."""
 
+import copy
 import csv
 import io
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +20,16 @@ from rcsc.driver.settings import Settings
 from rcsc.front.commands import run
 from rcsc.lang.model import ProvedProgram, seal_of_proof
 from rcsc.proof.solvers.options import Options
-from rcsc.views.trace.matrix import ProgramFacts, matrix
+from rcsc.views.trace import collect
+from rcsc.views.trace.matrix import REFUTED, ProgramFacts, matrix
 from rcsc.views.trace.page import page
 from tests.support.browser import Browser
 from tests.support.programs.examples import EVERYTHING
 from tests.support.programs.stages import program_of
-from tests.support.programs.texts import edited
+from tests.support.programs.texts import edit_file, edited
 
 REPO = Path(__file__).parents[2]
+Edit = Callable[[Any], object]
 DOOR = """\
 input door_shut : bool
 input button : bool
@@ -126,11 +130,11 @@ def test_code_that_nothing_in_the_tables_stands_for_is_told(
 def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(door: Path) -> None:
     assert run(["trace", str(door), "-q"]) == 0
     document = json.loads(Path("trace/trace.json").read_text(encoding="utf-8"))
-    assert document["requirements"]["SR-12"] == [
-        "press_once line go",
-        "press_once line open",
-        "property opened",
-    ]
+    standing = {one["place"]: one for one in document["requirements"]["SR-12"]}
+    assert list(standing) == ["press_once line go", "press_once line open", "property opened"]
+    go_stands = standing["press_once line go"]
+    assert go_stands["verdict"].startswith("proved: exactly one of 3 lines matches")
+    assert standing["property opened"]["verdict"].startswith("not proved here")
     [program] = document["programs"]
     [table] = program["tables"]
     assert table["verdict"] == "proved"
@@ -139,6 +143,9 @@ def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(do
     go, wait = lines["go"], lines["wait"]
     assert (go["requirements"], go["requirements_of_table"]) == (["SR-12", "SR-13"], ["SR-1"])
     assert go["place"].endswith("door.rcs:12")
+    taken = len(go["vectors"]["taken"])
+    assert go_stands["tests"] == f"{taken} {'vector' if taken == 1 else 'vectors'}"
+    assert go_stands["coverage"] == f"{go['vectors']['shown']} of {go['vectors']['conditions']} conditions"
     assert go["properties"] == {"opened": "changes press; tests door_shut"}
     assert wait["procedures"] == ["hold", "quiet"]
     assert wait["vectors"]["conditions"] == wait["vectors"]["shown"] + len(wait["vectors"]["not_shown"]) == 3
@@ -269,3 +276,89 @@ def test_a_kept_matrix_of_another_version_is_recognised(
     assert "with another meaning" in capsys.readouterr().out
     Path("trace/trace.json").write_text("[]", encoding="utf-8")
     assert run(check) == 2
+
+
+def gutted(document: Any) -> list[tuple[str, str]]:
+    """Yield each way in which a matrix lost or got something, as its text, and what is told of it."""
+    edits: list[tuple[Edit, str]] = [
+        (lambda one: one["lines"].pop(1), "`lines press_once wait` is missing"),
+        (lambda one: one["lines"][0].pop("vectors"), "`lines press_once go vectors` is missing"),
+        (
+            lambda one: one["lines"][0]["requirements"].clear(),
+            "`lines press_once go requirements SR-12` is missing",
+        ),
+        (
+            lambda one: one["tables"][0].update(verdict="refuted"),
+            "`tables press_once verdict` is `refuted`, and `proved` in this version",
+        ),
+        (lambda one: one["declared"].pop(), "`declared property opened` is missing"),
+        (lambda one: one["code"].pop(), "`code "),
+        (lambda one: one["files"].clear(), "is of other code of `door`"),
+        (lambda one: one.update(program="gate"), "has a program `gate` that is not here"),
+    ]
+    texts = []
+    for edit, told in edits:
+        changed = copy.deepcopy(document)
+        edit(changed["programs"][0])
+        texts.append((json.dumps(changed), told))
+    changed = copy.deepcopy(document)
+    del changed["requirements"]["SR-12"]
+    return [*texts, (json.dumps(changed), "`requirements SR-12` is missing")]
+
+
+def test_a_kept_matrix_is_compared_whole(door: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run(["trace", str(door), "-q", "--no-vectors"])
+    kept = Path("trace/trace.json")
+    check = ["trace", str(door), "-q", "--against", str(kept)]
+    document = json.loads(kept.read_text(encoding="utf-8"))
+    for text, told in gutted(document):
+        kept.write_text(text, encoding="utf-8")
+        capsys.readouterr()
+        assert run(check) == 1, told
+        assert told in " ".join(capsys.readouterr().out.split())
+    kept.write_text(json.dumps(document | {"form": 2}), encoding="utf-8")
+    assert run(check) == 2
+    kept.write_text(json.dumps(document), encoding="utf-8")
+    assert run(check) == 0
+    door.write_text(edited(DOOR, ('opened req "SR-12"', 'opened req "SR-11"')), encoding="utf-8")
+    capsys.readouterr()
+    assert run(check) == 1
+    assert "`declared property opened requirements SR-11` is missing" in capsys.readouterr().out
+
+
+def test_code_that_lies_there_and_is_another_is_told(door: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compile", "-q", str(door)]) == 0
+    trace = ["trace", str(door), "-q", "--no-vectors"]
+    assert run(trace) == 0
+    edit_file(Path("generated/c/door.c"), ("do not edit", "do edit"))
+    capsys.readouterr()
+    for options in ((), ("--against", "trace/trace.json")):
+        assert run([*trace, *options]) == 1
+        assert "error[RCS501]: `generated/c/door.c` differs" in capsys.readouterr().out
+    assert run([*trace, "--anew"]) == 0
+
+
+def test_a_requirement_has_a_standing(
+    door: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What `rcsc prove` refuted is told of the requirement that its property names; code without a requirement is named."""
+    names = ["SR-1", "SR-3", "SR-4", "SR-9", "SR-12", "SR-13", "<script>alert(1)</script>"]
+    listed = door.parent / "names.txt"
+    listed.write_text("\n".join(names) + "\n", encoding="utf-8")
+    check = ["trace", str(door), "--no-vectors", "--requirements", str(listed)]
+    assert run(check) == 0
+    said = capsys.readouterr().out
+    assert "7 of 7 requirements have a place: 4 proved, 0 refuted, 3 assumed or not proved here" in said
+    assert "parts of the code of `door` carry no requirement" in said
+    assert "c/door.h: " in said
+    monkeypatch.setattr(collect, "property_proofs", lambda *_: {"opened": f"{REFUTED}, system.toml"})
+    assert run(check) == 1
+    said = capsys.readouterr().out
+    assert "requirement `SR-12` is refuted: property opened is not proved: `rcsc prove` shows" in " ".join(
+        said.split()
+    )
+    assert "7 of 7 requirements have a place: 4 proved, 2 refuted, 1 assumed or not proved here" in said
+    rows = list(csv.DictReader(io.StringIO(Path("trace/requirements.csv").read_text(encoding="utf-8"))))
+    [stands] = [row for row in rows if row["place"] == "property opened" and row["requirement"] == "SR-12"]
+    assert stands["verdict"] == f"{REFUTED}, system.toml"
+    assert '<span class="bad">not proved: ' in Path("trace/trace.html").read_text(encoding="utf-8")

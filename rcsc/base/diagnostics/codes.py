@@ -1535,13 +1535,15 @@ class Code(StrEnum):
     REQUIREMENT_OPEN = """RCS607: requirements and tables do not fit
 
     `rcsc trace --requirements FILE` holds the names that the tables give after `req` against the list. A listed requirement that nothing
-    names, and a name that is not in the list, are errors; lines that name none, and whose table names none, are a warning. Name the
-    requirement where it is answered, or mend the list.
+    names, and a name that is not in the list, are errors; lines that name none, and whose table names none, and parts of the code that
+    carry none, are a warning. Name the requirement where it is answered, or mend the list. Without a list, too, a requirement of a
+    property that `rcsc prove` refuted is an error.
     """
     MATRIX_OLD = """RCS608: a matrix of another version
 
     `rcsc trace --against FILE` holds a kept matrix against these tables and the code that is made of them now. It is of another
-    version where the meaning of a program or a byte of a generated file differs. Make it anew, and review what changed with `rcsc diff`.
+    version where anything that it says differs: the meaning of a program, a byte of a generated file, a requirement, a verdict, a
+    vector. The notes name the first places. Make it anew, and review what changed with `rcsc diff`.
     """
     DOSSIER_OLD = """RCS609: a dossier of other files
 

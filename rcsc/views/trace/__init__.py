@@ -14,6 +14,6 @@ Trusted: what the templates and the emitter say of their lines. Whether the code
 `rcsc test` answers it. What it costs: a proof of the tables, and the search for vectors, which `--no-vectors` leaves out.
 
 Modules: `matrix` (all of one program), `proofs` (verdicts, and properties as far as they are
-known), `requirements` (against a list), `tables_of` (CSV and JSON), `page` (HTML), `answer` (one question), `collect` (all of it, for
-the command), `names` (the data dictionary).
+known), `requirements` (their standing; against a list), `tables_of` (CSV and JSON), `kept` (a kept matrix against this one), `page`
+(HTML), `answer` (one question), `collect` (all of it, for the command), `names` (the data dictionary).
 """

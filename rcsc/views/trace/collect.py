@@ -7,30 +7,36 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.cache import Cache, open_cache
 from rcsc.base.host.files import write_atomically
-from rcsc.base.host.files.read import Malformed, json_of, text
+from rcsc.base.host.files.read import json_of
+from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
-from rcsc.driver.compile import Generated, planned, systems_in, tables_in
+from rcsc.driver.compile import Generated, code_of, files_of, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
-from rcsc.driver.settings import Conclusion, Settings
+from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.driver.trials import whole_vectors
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
+from rcsc.views.trace.kept import against, kept, names_of
 from rcsc.views.trace.matrix import Matrix, ProgramFacts, matrix, of_system
 from rcsc.views.trace.page import page
 from rcsc.views.trace.proofs import property_proofs, table_proofs
-from rcsc.views.trace.requirements import covered, findings, listed, places
+from rcsc.views.trace.requirements import covered, findings, listed, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
 
 MOST_SHOWN = 10
 """Lines of generated code that come from nothing, named in one finding."""
+
+
+ANY_CODE = CodeWanted()
+"""What lies beside the project, if it does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +44,16 @@ class Wanted:
     """What is asked for.
 
     Attributes:
-        vectors: Whether test vectors are made.
+        vectors: Whether test vectors are made; where a kept matrix is held against this one, as it was made.
         requirements: A file with the names of all requirements, one in each line.
-        against: A matrix that was kept, which must be of this version.
+        against: A matrix that was kept, which must be the one of this version.
+        code: Generated files that lie there, which must be those that are traced.
     """
 
     vectors: bool = True
     requirements: Path | None = None
     against: Path | None = None
+    code: CodeWanted = ANY_CODE
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +63,17 @@ class Traced:
     Attributes:
         matrices: Of each program and system; none where something is not proved.
         listed: The requirements of the list.
+        vectors: Whether vectors were made.
     """
 
     conclusion: Conclusion
     matrices: tuple[Matrix, ...] = ()
     listed: tuple[str, ...] = ()
+    vectors: bool = False
 
     def files(self) -> dict[str, str]:
         """Give what is to be kept, by name."""
-        document = to_json(self.matrices, self.listed)
+        document = to_json(self.matrices, self.listed, vectors=self.vectors)
         return {
             "trace.json": json.dumps(document, indent=1) + "\n",
             "lines.csv": lines_csv(self.matrices),
@@ -81,7 +91,10 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
         OSError: The list of requirements, or the kept matrix, cannot be read.
         Malformed: It is not what it should be.
     """
-    names = () if wanted.requirements is None else listed(wanted.requirements)
+    was = None if wanted.against is None else kept(wanted.against)
+    names = names_of(was) if wanted.requirements is None else listed(wanted.requirements)
+    if was is not None:
+        wanted = replace(wanted, vectors=was.get("vectors") is not False)
     systems = tuple(systems_in(settings.paths))
     project = proved(replace(settings, paths=tables_in(settings.paths, systems)))
     report = project.report()
@@ -93,12 +106,30 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
     by_root = {os.path.realpath(root): plan for root, plan, _ in plans}
     matrices += [_of_system(by_root, path) for path in systems]
     settings.progress("")
-    found = [*_untraced(matrices)]
+    found = [*_untraced(matrices), *refuted(matrices), *_lying(project, systems, wanted.code)]
     if wanted.requirements is not None:
         found += findings(matrices, names, wanted.requirements)
-    if wanted.against is not None:
-        found += _against(matrices, wanted.against)
-    return Traced(Conclusion(project.report(tuple(found)), _closing(matrices, names)), tuple(matrices), names)
+    if was is not None and wanted.against is not None:
+        document = json_of(json.dumps(to_json(matrices, names, vectors=wanted.vectors)), plain=False)
+        found += against(was, document, wanted.against)
+    conclusion = Conclusion(project.report(tuple(found)), _closing(matrices, names))
+    return Traced(conclusion, tuple(matrices), names, wanted.vectors)
+
+
+def _lying(project: Proved, systems: tuple[Path, ...], code: CodeWanted) -> Iterator[Diagnostic]:
+    """Report generated files that lie there and are not those that are traced."""
+    for root, program in project.executable:
+        yield from code_of(root, partial(files_of, program, TARGETS), code, systems).stale
+    for path in systems:
+        yield from code_of(str(path), partial(_files_of_system, path, project), code, (path,)).stale
+
+
+def _files_of_system(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
+    generated = Generated(("c",), defensive)
+    for root, program in project.executable:
+        generated.add_program(root, program)
+    generated.add_system(path)
+    return generated.files
 
 
 def _matrix(
@@ -141,7 +172,7 @@ def _untraced(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:
 def _closing(matrices: Sequence[Matrix], names: Sequence[str]) -> str:
     lines = [f"{one.program}: {_figures(one)}" for one in matrices]
     if names:
-        lines.append(covered(places(matrices), names))
+        lines.append(covered(standings(matrices), names))
     return "\n".join(lines)
 
 
@@ -150,42 +181,6 @@ def _figures(one: Matrix) -> str:
     named = sum(bool(line.answers) for line in one.lines)
     lines = f"{len(one.lines)} lines, {named} with a requirement, " if one.lines else ""
     return f"{lines}{pieces}, {len(one.untraced) or 'none'} from nothing"
-
-
-# --- a matrix that was kept -------------------------------------------------------------------
-
-
-def _against(matrices: Sequence[Matrix], path: Path) -> Iterator[Diagnostic]:
-    """Yield the parts of a kept matrix that belong to another version."""
-    kept = _kept(path)
-    for one in matrices:
-        was = kept.get(one.program)
-        if was is None:
-            yield _old(path, f"has no program `{one.program}`")
-        elif was.get("digest") != one.digest:
-            yield _old(path, f"is of a program `{one.program}` with another meaning")
-        elif other := sorted(_changed(was.get("files"), one.files)):
-            yield _old(path, f"is of other code of `{one.program}`", *other)
-
-
-def _changed(was: Any, now: Mapping[str, str]) -> Iterator[str]:
-    before = was if isinstance(was, dict) else {}
-    yield from (name for name in {*before, *now} if before.get(name) != now.get(name))
-
-
-def _kept(path: Path) -> dict[str, dict[str, Any]]:
-    document = json_of(text(path))
-    programs = document.get("programs") if isinstance(document, dict) else None
-    if not isinstance(programs, list) or not all(isinstance(one, dict) for one in programs):
-        raise Malformed("it is no matrix of `rcsc trace`")
-    return {str(one.get("program")): one for one in programs}
-
-
-def _old(path: Path, what: str, *notes: str) -> Diagnostic:
-    helps = ("`rcsc trace` makes it anew",)
-    return Diagnostic(
-        Code.MATRIX_OLD, f"`{path}` {what}", Label(Span(str(path), 0, 0)), notes=notes, help=helps
-    )
 
 
 def written(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:

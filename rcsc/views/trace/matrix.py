@@ -32,6 +32,7 @@ from rcsc.run.link import Linked, rendered_system
 
 OWES_NOTHING = "proved: it owes nothing"
 KEPT = "proved: every cycle keeps it"
+REFUTED = "not proved: `rcsc prove` shows the shortest run against it"
 NOT_HERE = "not proved here: `rcsc prove` proves it of the levels together"
 
 

@@ -11,7 +11,7 @@ from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
 from rcsc.views.pages.frame import palette
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
-from rcsc.views.trace.requirements import places
+from rcsc.views.trace.requirements import Standing, standings
 from rcsc.views.trace.tables_of import spots
 
 _STYLE = """* { box-sizing: border-box; }
@@ -52,7 +52,7 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
         "<h1>Traceability</h1>",
         f"<p>{_ABOUT}</p>",
         f"<nav>{''.join(links)}</nav>",
-        *_requirements(places(matrices), listed),
+        *_requirements(standings(matrices), listed),
         *(part for one in matrices for part in _program(one)),
     ]
     return framed("Traceability", body)
@@ -89,7 +89,7 @@ def listing(words: Iterable[str], style: str = "") -> str:
     return f'<span class="{style}">{cell}</span>' if style and cell else cell
 
 
-def _requirements(known: Mapping[str, Sequence[str]], listed: Sequence[str]) -> Iterator[str]:
+def _requirements(known: Mapping[str, Sequence[Standing]], listed: Sequence[str]) -> Iterator[str]:
     yield "<h2>Requirements</h2>"
     names = dict.fromkeys((*listed, *known))
     if not names:
@@ -99,10 +99,16 @@ def _requirements(known: Mapping[str, Sequence[str]], listed: Sequence[str]) -> 
         yield f"<p>{sum(name in known for name in listed)} of {len(listed)} in the list have a place.</p>"
     rows = []
     for name in names:
-        where = listing(known[name]) if name in known else '<span class="bad">nothing is for it</span>'
         note = ' <span class="bad">not in the list</span>' if listed and name not in listed else ""
-        rows.append(row(f'<span class="for">{escape(name)}</span>{note}', where))
-    yield tabled({"requirement": 25, "named by": 75}, rows)
+        head = f'<span class="for">{escape(name)}</span>{note}'
+        if name not in known:
+            rows.append(row(head, '<span class="bad">nothing is for it</span>', "", "", ""))
+        for at, one in enumerate(known.get(name, ())):
+            verdict = listing([one.verdict], "bad" if one.refuted else "")
+            rows.append(
+                row("" if at else head, escape(one.place), verdict, escape(one.tests), escape(one.coverage))
+            )
+    yield tabled({"requirement": 18, "named by": 26, "verdict": 34, "tests": 9, "coverage": 13}, rows)
 
 
 def _program(matrix: Matrix) -> Iterator[str]:

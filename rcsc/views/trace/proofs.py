@@ -10,13 +10,13 @@ from rcsc.compose.proof.standing import PROPERTY, KnownVerdict
 from rcsc.driver.outline import known
 from rcsc.lang.model import Program
 from rcsc.lang.project import systems_above
-from rcsc.views.trace.matrix import TableProof
+from rcsc.views.trace.matrix import REFUTED, TableProof
 
 _SAID = {
     KnownVerdict.PROVED: "proved of the levels together",
     KnownVerdict.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
     KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
-    KnownVerdict.NOT_PROVED: "not proved: `rcsc prove` shows the shortest run against it",
+    KnownVerdict.NOT_PROVED: REFUTED,
 }
 
 

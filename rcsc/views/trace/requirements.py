@@ -1,9 +1,10 @@
 """A list of requirements held against those that the tables name: which have no place, which line has none.
 
-In: matrices, and perhaps a file with one name in each line. Out: places by requirement, and findings.
+In: matrices, and perhaps a file with one name in each line. Out: places and standing by requirement, and findings.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.files.read import text
-from rcsc.views.trace.matrix import Matrix
+from rcsc.views.trace.matrix import REFUTED, Declared, Matrix, Tests, TracedLine
 
 
 def listed(path: Path) -> tuple[str, ...]:
@@ -25,25 +26,98 @@ def listed(path: Path) -> tuple[str, ...]:
     return tuple(dict.fromkeys(line for line in lines if line and not line.startswith("#")))
 
 
-def places(matrices: Iterable[Matrix]) -> dict[str, list[str]]:
-    """Give the places that name each requirement, in the order in which they are met.
+MOST_PARTS = 6
+"""Parts of a file that carry no requirement, named in a note."""
 
-    A table and a procedure of a file that several programs use stand there once.
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """The standing of a requirement at one place that names it.
+
+    Attributes:
+        verdict: What is proved there.
+        tests: How many vectors take a line of it.
+        coverage: How many conditions of its lines a pair of vectors shows to decide them.
     """
-    found: dict[str, dict[str, None]] = {}
+
+    place: str
+    verdict: str
+    tests: str
+    coverage: str
+
+    @property
+    def refuted(self) -> bool:
+        """Whether it was found not to hold."""
+        return self.verdict.startswith(REFUTED)
+
+
+def standings(matrices: Iterable[Matrix]) -> dict[str, list[Standing]]:
+    """Give the places that name each requirement, in the order in which they are met, with its standing there.
+
+    A table and a procedure of a file that several programs use stand there once; what is refuted of one counts.
+    """
+    found: dict[str, dict[str, Standing]] = {}
     for matrix in matrices:
-        for name, place in _named(matrix):
-            found.setdefault(name, {})[place] = None
-    return {name: list(where) for name, where in sorted(found.items())}
+        for name, here in _named(matrix):
+            known = found.setdefault(name, {})
+            if here.place not in known or here.refuted:
+                known[here.place] = here
+    return {name: list(where.values()) for name, where in sorted(found.items())}
 
 
-def _named(matrix: Matrix) -> Iterator[tuple[str, str]]:
+def places(matrices: Iterable[Matrix]) -> dict[str, list[str]]:
+    """Give the places that name each requirement."""
+    return {name: [one.place for one in where] for name, where in standings(matrices).items()}
+
+
+def _named(matrix: Matrix) -> Iterator[tuple[str, Standing]]:
+    verdicts = {name: f"{proof.verdict}: {proof.method}" for name, proof in matrix.tables.items()}
     for table, names in matrix.requirements.items():
-        yield from ((name, f"table {table}") for name in names)
+        lines = [line for line in matrix.lines if line.table == table]
+        here = _standing(f"table {table}", verdicts.get(table, ""), lines)
+        yield from ((name, here) for name in names)
     for line in matrix.lines:
-        yield from ((name, f"{line.table} line {line.name}") for name in line.requirements)
+        here = _standing(f"{line.table} line {line.name}", verdicts.get(line.table, ""), [line])
+        yield from ((name, here) for name in line.requirements)
     for one in matrix.declared:
-        yield from ((name, f"{one.sort} {one.name}") for name in one.requirements)
+        here = _standing(f"{one.sort} {one.name}", one.proof, [*_lines_of(matrix, one)])
+        yield from ((name, here) for name in one.requirements)
+
+
+def _lines_of(matrix: Matrix, one: Declared) -> Iterator[TracedLine]:
+    """Yield the lines that run a procedure, speak of a property, or are of a table that relies on an assumption."""
+    for line in matrix.lines:
+        runs = one.sort == "procedure" and one.name in line.procedures
+        speaks = one.sort == "property" and one.name in dict(line.properties)
+        if runs or speaks or f"table {line.table}" in one.used:
+            yield line
+
+
+def _standing(place: str, verdict: str, lines: Sequence[TracedLine]) -> Standing:
+    looked = [line.tests for line in lines if line.tests != Tests()]
+    if not looked:
+        return Standing(place, verdict, "", "")
+    vectors = {number for tests in looked for number in tests.taken}
+    shown, every = sum(tests.shown for tests in looked), sum(tests.conditions for tests in looked)
+    return Standing(
+        place,
+        verdict,
+        f"{len(vectors)} {'vector' if len(vectors) == 1 else 'vectors'}",
+        f"{shown} of {every} conditions",
+    )
+
+
+def refuted(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:
+    """Report each requirement that is refuted at a place that names it."""
+    sources = {f"{one.sort} {one.name}": one.place for matrix in matrices for one in matrix.declared}
+    for name, where in standings(matrices).items():
+        for one in where:
+            if one.refuted:
+                file = sources.get(one.place, "").rpartition(":")[0]
+                yield Diagnostic(
+                    Code.REQUIREMENT_OPEN, f"requirement `{name}` is refuted: {one.place} is {one.verdict}",
+                    Label(Span(file, 0, 0)),
+                )  # fmt: skip
 
 
 def findings(matrices: Sequence[Matrix], wanted: Sequence[str], file: Path) -> Iterator[Diagnostic]:
@@ -79,8 +153,34 @@ def _without(matrices: Iterable[Matrix]) -> Iterator[Diagnostic]:
                 Code.REQUIREMENT_OPEN, message, Label(Span(matrix.source, 0, 0)), severity=Severity.WARNING,
                 notes=tuple(f"{line.place}: {line.table} line {line.name}" for line in lines),
             )  # fmt: skip
+        yield from _parts(matrix)
 
 
-def covered(known: Mapping[str, Sequence[str]], wanted: Sequence[str]) -> str:
-    """Say how many of the listed requirements have a place."""
-    return f"{sum(name in known for name in wanted)} of {len(wanted)} requirements have a place"
+def _parts(matrix: Matrix) -> Iterator[Diagnostic]:
+    """Tell the parts of the code that carry no requirement, file by file; `code.csv` has every one."""
+    parts: dict[str, dict[str, None]] = {}
+    for piece in matrix.pieces:
+        if not matrix.answers(piece.origin):
+            parts.setdefault(piece.file, {})[piece.origin.words] = None
+    if parts:
+        count = sum(map(len, parts.values()))
+        message = f"{count} parts of the code of `{matrix.program}` carry no requirement"
+        yield Diagnostic(
+            Code.REQUIREMENT_OPEN, message, Label(Span(matrix.source, 0, 0)), severity=Severity.WARNING,
+            notes=tuple(f"{file}: {_some([*words])}" for file, words in parts.items()),
+        )  # fmt: skip
+
+
+def _some(words: Sequence[str]) -> str:
+    more = f", and {len(words) - MOST_PARTS} more" if len(words) > MOST_PARTS else ""
+    return f"{', '.join(words[:MOST_PARTS])}{more}"
+
+
+def covered(known: Mapping[str, Sequence[Standing]], wanted: Sequence[str]) -> str:
+    """Say how many of the listed requirements have a place, and how they stand."""
+    placed = [known[name] for name in wanted if name in known]
+    false = sum(any(one.refuted for one in where) for where in placed)
+    proved = sum(all(one.verdict.startswith("proved") for one in where) for where in placed)
+    rest = len(placed) - proved - false
+    words = f"{proved} proved, {false} refuted, {rest} assumed or not proved here"
+    return f"{len(placed)} of {len(wanted)} requirements have a place: {words}"

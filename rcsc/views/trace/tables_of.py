@@ -5,11 +5,12 @@ from typing import Any
 
 from rcsc import __version__
 from rcsc.base.host.files import csv_text
+from rcsc.base.host.files.plain import plain
 from rcsc.code.emit.rendering import Piece
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
-from rcsc.views.trace.requirements import places
+from rcsc.views.trace.requirements import standings
 
-FORM = 2
+FORM = 3
 """Version of the JSON form; it rises when a member changes its meaning or goes away."""
 FORWARD = (
     "program", "table", "line", "place", "requirements", "of the table", "conditions", "actions", "C runs", "C matches",
@@ -74,24 +75,26 @@ def _backward(matrix: Matrix, piece: Piece) -> tuple[object, ...]:
 
 def requirements_csv(matrices: Sequence[Matrix], wanted: Sequence[str]) -> str:
     """Return one row for each requirement and place; a listed one that nothing names stands alone."""
-    known = places(matrices)
-    rows: list[Sequence[object]] = [("requirement", "place")]
+    known = standings(matrices)
+    rows: list[Sequence[object]] = [("requirement", "place", "verdict", "tests", "coverage")]
     for name in dict.fromkeys((*wanted, *known)):
-        rows += [(name, place) for place in known.get(name, [""])]
+        rows += [(name, one.place, one.verdict, one.tests, one.coverage) for one in known.get(name, ())]
+        rows += [] if name in known else [(name, "", "", "", "")]
     return csv_text(rows)
 
 
 # --- JSON ------------------------------------------------------------------------------------
 
 
-def to_json(matrices: Sequence[Matrix], wanted: Sequence[str]) -> dict[str, Any]:
-    """Return all of it as a JSON value."""
+def to_json(matrices: Sequence[Matrix], wanted: Sequence[str], *, vectors: bool) -> dict[str, Any]:
+    """Return all of it as a JSON value, which says whether vectors were made."""
     return {
         "form": FORM,
         "tool": {"name": "rcsc", "version": __version__},
         "command": "trace",
         "listed": list(wanted),
-        "requirements": places(matrices),
+        "vectors": vectors,
+        "requirements": {name: [plain(one) for one in where] for name, where in standings(matrices).items()},
         "programs": [_program(matrix) for matrix in matrices],
     }
 

@@ -8,7 +8,8 @@ import click
 
 from rcsc.base.diagnostics.diagnostic import sort_key
 from rcsc.base.host.files.read import Malformed
-from rcsc.front.commands.shared.options import PATHS, proving, settings_of, showing
+from rcsc.driver.settings import CodeWanted
+from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
 from rcsc.front.commands.shared.show import Output, finish, put
 from rcsc.proof.solvers.options import Options
 from rcsc.views.trace.answer import answer, suggestions
@@ -39,25 +40,27 @@ Exit status: 0 all is traced, 1 findings, 2 usage.""",
 @click.option("--requirements", type=_FILE, default=None, metavar="FILE",
               help="Names of all requirements, one in each line: each must have a place, and tables name no other.")  # fmt: skip
 @click.option("--against", type=_FILE, default=None, metavar="FILE",
-              help="A kept trace.json, which must be of these tables and this code; nothing is written.")  # fmt: skip
+              help="A kept trace.json, which must be the matrix of this version in all that it says; nothing is written.")  # fmt: skip
 @click.option("--vectors/--no-vectors", default=True, show_default=True,
               help="Make the test vectors, and say which are for which line.")  # fmt: skip
+@looking
 @proving
 @showing
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paths: tuple[str, ...], out: Path, asked: tuple[str, ...], requirements: Path | None, against: Path | None,
-    vectors: bool, options: Options, use_cache: bool, output: Output,
+    vectors: bool, code: CodeWanted, options: Options, use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Trace lines of tables to requirements, code, tests and proofs, and code back to lines.
 
     The tables are proved and compiled anew. For each line: what it is for, the lines of C and of Python that match it, run for it
     and are called by it, the vectors that are made for it and those that take it, what is proved of its table, and the properties that
     speak of what it changes. For each piece of generated code: the line, procedure or declaration that it comes from; a line of code
-    that comes from nothing is a finding. With --requirements, so are a requirement without a place and a name that is not in the
-    list, and lines that name none are told.
+    that comes from nothing is a finding, and so is a requirement whose property is refuted, and a generated file that lies there and is
+    not what the tables give. With --requirements, so are a requirement without a place and a name that is not in the list; lines that
+    name none, and parts of the code that carry none, are told.
     """
     settings = settings_of(options, use_cache, output, paths)
-    wanted = Wanted(vectors and not against, requirements, against)
+    wanted = Wanted(vectors, requirements, against, code)
     try:
         traced = trace(settings, wanted)
     except (OSError, Malformed) as error:
