@@ -126,7 +126,7 @@ def test_lenses_do_what_they_say(client: Client) -> None:
         client.run(each["command"]["command"], *each["command"]["arguments"]) for each in lenses
     )
     assert "failed" in proved["text"]
-    assert "boxes" in proved["text"]
+    assert "decided by counting, confirmed by Z3" in proved["text"]
     assert witness["text"].startswith("input: reported = done, width_mm = 0\n0 of 4 lines match")
     assert "under `width_mm` stands `20 .. 40`, and it is 0" in witness["text"]
     assert graph["text"]

@@ -18,7 +18,7 @@ from rcsc.base.diagnostics.sarif import sarif
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
-from rcsc.lang.model import Program, Value
+from rcsc.lang.model import Program, Real, Value
 from rcsc.lang.resolve import compile_text
 from rcsc.proof.certify import certify
 from rcsc.proof.solvers import smt
@@ -335,7 +335,10 @@ def assert_alike(program: Program, steps: int = STEPS) -> None:
             continue
         kinds, rest = map(list, zip(*(_said(verdict) for verdict in (one, both, alone)), strict=True))
         assert kinds[0] == kinds[1] == kinds[2], names
-        if one.backing.method in {"boxes", "tree"}:  # else its least inputs are those found within few steps
+        slow = any(isinstance(variable.type, Real) for variable in program.variables)
+        if (
+            one.backing.method in {"boxes", "tree"} and not slow
+        ):  # else least inputs are those found within few steps
             assert rest[0] == rest[1] == rest[2], names
             assert one.backing.assumptions == alone.backing.assumptions
 
