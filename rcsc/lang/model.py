@@ -208,10 +208,14 @@ def spell(kind: Scalar, value: Value) -> str:
 
 
 def unspelled(kind: Scalar, text: str) -> Value:
-    """Return the value that `spell` gives as this text."""
+    """Return the value that `spell` gives as this text.
+
+    Raises:
+        ValueError: It gives this text for none.
+    """
     match kind:
         case Bool():
-            return text == "true"
+            return ("false", "true").index(text) == 1
         case Enum(members=members):
             return members.index(text)
         case Int():
@@ -240,18 +244,7 @@ def _power(name: str, power: int) -> str:
 def value_of_text(kind: Scalar, text: str) -> Value | None:
     """Return the value that this text spells; None where the type has no such value."""
     try:
-        value: Value
-        match kind:
-            case Bool():
-                value = ("false", "true").index(text) == 1
-            case Enum(members=members):
-                value = members.index(text)
-            case Int():
-                value = int(text)
-            case Single():
-                value = single(float(text))
-            case Real():
-                value = float(text)
+        value = unspelled(kind, text)
         low, high = key_bounds(kind)
         return value if low <= key_of(kind, value) <= high else None
     except (ValueError, OverflowError):
