@@ -29,13 +29,14 @@ from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof.candidates import Candidates, candidates, keep_candidates
 from rcsc.compose.proof.context import RepeatedLine
-from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.ranking import parts
 from rcsc.compose.proof.system import (
     NoProgramError,
     _without_nodes,
+    keep,
     prove_transition_systems,
+    recall,
     transition_systems,
 )
 from rcsc.compose.proof.termination import Phase, longest

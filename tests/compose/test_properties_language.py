@@ -24,9 +24,8 @@ from rcsc.compose.counterexample.cycle_run import broken
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.invariant.search import Effort, read
-from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
-from rcsc.compose.proof.system import transition_systems
+from rcsc.compose.proof.system import keep, recall, transition_systems
 from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Enum, Kind, Value, key_bounds, value_of_key

@@ -18,6 +18,6 @@ A proof is kept under a digest of all that it depends on, and only read the next
 the first that the next one tries.
 
 Modules, in the order the data flows: `context` (lines), `staying` (the cycles of one table), `ranking` (what stops), `termination`
-(commands), `candidates` (clauses of the last search), `level` (all of one level), `assume_guarantee` (promises, claims), `kept` and
-`standing` (the cache), `system`.
+(commands), `candidates` (clauses of the last search), `level` (all of one level), `assume_guarantee` (promises, claims),
+`standing` (what the cache has of a system), `system`.
 """

@@ -1,9 +1,10 @@
-"""The whole system proved, level by level.
+"""The whole system proved, level by level, as far as the cache has no proof of a level.
 
 In: a system's description. Out: `SystemProof`. The argument in `compose.__doc__` puts the proofs of the levels together.
 It needs two checks, made here: what a level assumes of a neighbour was proved of that neighbour, and both agree initially.
 """
 
+import hashlib
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,12 +19,18 @@ from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed, of_refusals
 from rcsc.compose.contract.environment import Links, check_ends, links
 from rcsc.compose.contract.facts import with_facts
-from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.obligations import Obligation, Unstated, obligations
+from rcsc.compose.contract.predicates import CLOSELY, compared
+from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Safety, TransitionSystem
-from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
-from rcsc.compose.proof.kept import keep, recall
-from rcsc.compose.proof.level import LevelProof, Verdict, prove_level, without_nodes
+from rcsc.compose.invariant.pdr import Clause
+from rcsc.compose.invariant.search import Effort, read
+from rcsc.compose.proof.assume_guarantee import agreements, claims, of_level, other_end
+from rcsc.compose.proof.candidates import content
+from rcsc.compose.proof.context import Context
+from rcsc.compose.proof.level import LevelProof, Verdict, joined, prove_level, without_nodes
+from rcsc.compose.proof.standing import Verdicts, keep_verdicts
+from rcsc.compose.proof.termination import Ending
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import AssumptionName, Program
 from rcsc.lang.project import Loaded, load
@@ -100,10 +107,10 @@ def read_systems(path: Path) -> tuple[dict[str, TransitionSystem], dict[str, Loa
         NoProgramError: The tables of a level cannot be read.
     """
     system = description(path)
-    read = {spec.name: checked(path, spec.program) for spec in system.levels}
-    systems = transition_systems_of(system, {name: program for name, (program, _, _) in read.items()})
-    loaded = {spec.program: read[spec.name][2] for spec in system.levels}
-    return {name: replace_safety(ts, read[name][1]) for name, ts in systems.items()}, loaded
+    found = {spec.name: checked(path, spec.program) for spec in system.levels}
+    systems = transition_systems_of(system, {name: program for name, (program, _, _) in found.items()})
+    loaded = {spec.program: found[spec.name][2] for spec in system.levels}
+    return {name: replace(ts, safety=found[name][1]) for name, ts in systems.items()}, loaded
 
 
 def transition_systems_of(
@@ -151,8 +158,6 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
     above = mine.above
     if above is None or above.outside:
         return mine
-    from rcsc.compose.contract.predicates import compared
-
     upper = next((below for below in every[above.name].below if below.name == mine.level), None)
     if upper is None:
         raise BadDescription(
@@ -199,11 +204,6 @@ def _safety(
         return Safety()
     broken = any(diagnostic.code is Code.INVARIANT_BROKEN for diagnostic in diagnostics)
     return Safety(tuple(invariant.name for invariant in program.invariants), broken)
-
-
-def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
-    """Return the transition system with this safety of its program."""
-    return replace(ts, safety=safety)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
@@ -306,3 +306,94 @@ def _again(ts: TransitionSystem, proof: LevelProof) -> tuple[tuple[Obligation, V
     return tuple(
         (obligation, verdict) for obligation, (_, verdict) in zip(wanted, proof.verdicts, strict=True)
     )
+
+
+# --- proofs that an earlier run made ---------------------------------------------------------
+# The key is all that a proof depends on: the program as resolved, the level, its links, the effort; and rcsc itself with its solvers
+# (`base.host.cache`). A proof with anything undecided is not kept: another run may decide it. The verdicts are kept once more, without
+# effort and invariant (`standing`).
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A proof as it is kept: obligations by key, predicates by name; the transition system gives both anew."""
+
+    verdicts: tuple[tuple[Key, Verdict], ...]
+    predicates: tuple[str, ...]
+    clauses: tuple[Clause, ...]
+    walked: int
+    learnt: int
+    seconds: float
+    context: Context | None
+    endings: tuple[Ending, ...]
+    unstated: tuple[Unstated, ...]
+    stands: bool
+    parts: "tuple[_Kept, ...]" = ()
+
+
+def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
+    """Return the proof of the level, if it is kept."""
+    kept = cache.load(_Kept, *_key(ts, effort))
+    proof = None if kept is None else _whole(ts, kept)
+    if proof is not None:
+        keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
+    return proof
+
+
+def _whole(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
+    """Return the proof with its parts: with refusals, where there are any, and without."""
+    if not kept.parts:
+        return _recalled(ts.refusing(), kept)
+    with_refusals, without = (
+        _recalled(each, part) for each, part in zip((ts.refusing(), ts), kept.parts, strict=True)
+    )
+    return None if with_refusals is None or without is None else joined(with_refusals, without)
+
+
+def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
+    """Return the proof of one environment, if it is of the level as it is."""
+    cycle = ts.cycle(ts.havoc())
+    wanted = obligations(ts, cycle)
+    if [obligation.key for obligation in wanted] != [key for key, _ in kept.verdicts]:
+        return None
+    for closely in range(CLOSELY + 1):
+        chosen = every_predicate(ts, cycle, read(cycle, wanted), closely)
+        if tuple(predicate.name for predicate in chosen) == kept.predicates:
+            verdicts = tuple(
+                (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
+            )
+            return LevelProof(
+                ts.level.name, verdicts, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
+                context=kept.context, endings=kept.endings, unstated=kept.unstated, stands=kept.stands,
+            )  # fmt: skip
+    return None
+
+
+def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) -> None:
+    """Keep the proof, unless something was left undecided."""
+    if any(verdict is Verdict.UNDECIDED for part in (proof, *proof.parts) for _, verdict in part.verdicts):
+        return
+    cache.store(_kept(proof), *_key(ts, effort))
+    keep_verdicts(cache, content(ts), _shortened(ts, proof))
+
+
+def _kept(proof: LevelProof) -> _Kept:
+    return _Kept(
+        tuple((obligation.key, verdict) for obligation, verdict in proof.verdicts),
+        tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
+        proof.context, proof.endings, proof.unstated, proof.stands, tuple(map(_kept, proof.parts)),
+    )  # fmt: skip
+
+
+def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
+    """Shorten the proof to its verdicts, without the invariant."""
+    claims = dict(of_level(ts, proof))
+    return Verdicts(
+        claims,
+        tuple(f"table `{owed.table}`: {owed.shown}" if owed.table else owed.shown for owed in proof.open),
+        tuple(unstated.shown for unstated in proof.unstated if unstated.applies),
+    )
+
+
+def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
+    return content(ts), hashlib.sha256(repr(effort).encode()).hexdigest()
