@@ -1,11 +1,12 @@
 """Walks over expressions and statements: their parts, the same with other parts, and who reads and writes which leaf; free names."""
 
 from collections import defaultdict
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
-from typing import assert_never
+from typing import TypeVar, assert_never
 
+from rcsc.base.diagnostics.source import Span
 from rcsc.lang.model import (
     BEFORE,
     Among,
@@ -36,6 +37,8 @@ from rcsc.lang.model import (
     earlier,
     pending,
 )
+
+Node = TypeVar("Node", bound=Hashable)
 
 
 def parts(expr: Expr) -> Iterator[Expr]:
@@ -99,6 +102,13 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
             yield part.name
         elif isinstance(part, Select):
             yield from part.leaves
+
+
+def reads_of(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
+    """Yield the leaves that each part of the expression may read, with the part's place."""
+    for part in parts(expr):
+        if isinstance(part, Read | Select):
+            yield (part.name,) if isinstance(part, Read) else part.leaves, part.span
 
 
 def one_earlier(expr: Expr) -> Expr:
@@ -197,6 +207,11 @@ def closure(called: Iterable[str], procedures: Mapping[str, Procedure]) -> set[s
     return seen
 
 
+def is_part(leaf: str, whole: str) -> bool:
+    """Return whether the leaf is the variable, or a field or element of it."""
+    return leaf == whole or leaf.startswith((f"{whole}.", f"{whole}["))
+
+
 def may_write(body: Iterable[Statement], procedures: Mapping[str, Procedure]) -> frozenset[VariableName]:
     """Return the leaves that the statements may write, calls included."""
     leaves: set[VariableName] = set()
@@ -289,6 +304,27 @@ class Uses:
             if line and line not in lines:
                 lines.append(line)
             self.requirements[leaf].update(dict.fromkeys(answers))
+
+
+def shortest_circle(edges: Mapping[Node, Collection[Node]]) -> list[Node]:
+    """Return a shortest way along the edges from a node back to it, with that node at both ends; empty where there is none.
+
+    >>> shortest_circle({"a": ["b"], "b": ["c", "a"], "c": ["a"]})
+    ['a', 'b', 'a']
+    """
+    return min(filter(None, (_way_back(start, edges) for start in edges)), key=len, default=[])
+
+
+def _way_back(start: Node, edges: Mapping[Node, Collection[Node]]) -> list[Node]:
+    ways, waiting = {start: [start]}, [start]
+    for at in waiting:
+        for following in edges[at]:
+            if following == start:
+                return [*ways[at], start]
+            if following not in ways:
+                ways[following] = [*ways[at], following]
+                waiting.append(following)
+    return []
 
 
 def free_name(name: str, taken: Container[str]) -> str:

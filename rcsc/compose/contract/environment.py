@@ -8,6 +8,7 @@ order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_c
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from rcsc.lang.leaves import is_part
 from rcsc.lang.model import (
     Enum,
     Expr,
@@ -117,11 +118,6 @@ class Links:
     def written_as(self, leaf: str) -> tuple[str, str, str] | None:
         """Return the input that this leaf is part of, its writer and the writer's output; None where no level writes it."""
         return next((one for one in self.written if is_part(leaf, one[0])), None)
-
-
-def is_part(leaf: str, record: str) -> bool:
-    """Return whether the leaf is the variable, or a field or element of it."""
-    return leaf == record or leaf.startswith((f"{record}.", f"{record}["))
 
 
 def leaves_under(program: Program, record: str) -> tuple[str, ...]:
@@ -317,7 +313,7 @@ def _whole(level: str, program: Program, order: str, report: str) -> None:
     Raises:
         BadDescription: A field is missing, a number is not whole, or the two commands differ in type.
     """
-    kinds = {str(variable.name): variable.type for variable in program.variables}
+    kinds = program.kinds
     needed = f"{order}.{COMMAND}", f"{report}.{ECHOED}", f"{report}.{STATUS}"
     missing = [f"`{level}.{name}`" for name in needed if name not in kinds]
     if missing:

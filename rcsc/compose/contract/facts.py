@@ -17,8 +17,8 @@ from dataclasses import replace
 from itertools import product
 from math import prod
 
-from rcsc.compose.contract.environment import Given, Links, Owed, is_part
-from rcsc.lang.leaves import parts, read_by, renamed
+from rcsc.compose.contract.environment import Given, Links, Owed
+from rcsc.lang.leaves import is_part, parts, read_by, renamed
 from rcsc.lang.model import (
     Assumption,
     Bool,

@@ -213,7 +213,7 @@ class TransitionSystem:
     def __post_init__(self) -> None:
         """Derive types, inputs and trusted assumptions from the program."""
         self.procedures = {procedure.name: procedure for procedure in self.program.procedures}
-        self.kinds = {str(v.name): v.type for v in self.program.variables}
+        self.kinds = self.program.kinds
         self.inputs = tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
         for asked in self.links.asked:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
@@ -377,7 +377,7 @@ class TransitionSystem:
         held = ((name, int(snapshot[leaf])) for name, leaf in self.program.line_leaves.items())
         numbers = {name: number for name, number in held if number}
         order = [name for name in self.level.staged if name in numbers]
-        return tuple((str(name), line_names(self.table(name))[numbers[name] - 1]) for name in order)
+        return tuple((str(name), str(self.table(name).every_line[numbers[name] - 1].name)) for name in order)
 
     def cycle(
         self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None, *, anew: bool = False
@@ -599,8 +599,3 @@ def successor(number: Node) -> Node:
     """Return the next number of 16 bits."""
     step, modulus = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
     return values.remainder(values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus, number.kind)
-
-
-def line_names(table: Table) -> tuple[str, ...]:
-    """Return the names of a table's lines, DEFAULT last."""
-    return tuple(str(line.name) for line in (*table.lines, table.default) if line is not None)

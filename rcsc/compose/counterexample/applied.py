@@ -19,7 +19,7 @@ from rcsc.base.diagnostics.diagnostic import Change, ChangeKind, Proposal
 from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, matching_lines
-from rcsc.lang.model import AssumptionName, Program, Scalar, Snapshot, Table
+from rcsc.lang.model import AssumptionName, Program, Snapshot, Table
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
 from rcsc.lang.written.changes import spliced
@@ -105,7 +105,7 @@ class Text:
     def _says(self, program: Program) -> bool:
         """Return whether a program has this very table, and variables of the same types."""
         tables = [table for table in program.tables if table.name == self.table.name]
-        return tables == [replace(self.table, stops=())] and _kinds(program) == _kinds(self.ts.program)
+        return tables == [replace(self.table, stops=())] and program.kinds == self.ts.program.kinds
 
     # --- changes ---
 
@@ -215,7 +215,7 @@ class Text:
 
     def _level(self, verdict: ProgramVerdict) -> TransitionSystem | None:
         """Return the level with the program that was proved; None if that has other leaves."""
-        if _kinds(verdict.program) != _kinds(self.ts.program):
+        if verdict.program.kinds != self.ts.program.kinds:
             return None
         stops = {table.name: table.stops for table in self.ts.program.tables}
         tables = (
@@ -300,7 +300,3 @@ def _no_weaker(program: Program, table: Table) -> bool:
         for line in lines
     )
     return all(find(universe, [*one, negated(universe, assumed)]) is NoWitness.NONE for one in alone)
-
-
-def _kinds(program: Program) -> Mapping[str, Scalar]:
-    return {str(variable.name): variable.type for variable in program.variables}

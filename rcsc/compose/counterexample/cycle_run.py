@@ -27,7 +27,7 @@ from rcsc.lang.interpret import (
     run_stage,
     settle,
 )
-from rcsc.lang.model import Default, Line, Snapshot, Statement, Table, Value
+from rcsc.lang.model import Snapshot, Statement, Table, Value
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
 
@@ -169,8 +169,7 @@ def _failed(ts: TransitionSystem, table: Table, now: Snapshot) -> tuple[str, ...
 
 def _actions(table: Table, name: str) -> list[Statement]:
     """Return the actions of a line."""
-    lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
-    return [action.statement for line in lines if line.name == name for action in line.actions]
+    return [action.statement for line in table.every_line if line.name == name for action in line.actions]
 
 
 def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:

@@ -20,7 +20,7 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, ran_on, seen_by_tabl
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, Unrolled, traces
 from rcsc.lang.interpret import UNDEFINED, matching_lines
-from rcsc.lang.model import Box, Enum, Program, Scalar, Snapshot, Table, key_of, spell
+from rcsc.lang.model import Box, Enum, Program, Snapshot, Table, key_of, spell
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
@@ -374,7 +374,7 @@ class _Harms:
 def around(program: Program, table: Table, seen: Snapshot) -> Region:
     """Grow a maximal region, in which no line matches, around an input that none matches."""
     decided = boxes.TableBoxes.of(program, table)
-    kinds = {str(v.name): v.type for v in program.variables}
+    kinds = program.kinds
     cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
     region = Gaps.of(decided, disjoint=True).grown(cell, ())
     return decided.narrowed(region)
@@ -402,8 +402,7 @@ def weakest_condition(program: Program, table: Table) -> str:
 
 
 def _conditions(program: Program, region: Region) -> str:
-    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
-    return " and ".join(cells.region(kinds, region)) or "true"
+    return " and ".join(cells.region(program.kinds, region)) or "true"
 
 
 def _while(program: Program, table: Table, matching: list[int]) -> str:

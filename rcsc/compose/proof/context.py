@@ -19,8 +19,8 @@ from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.lang.leaves import everything, written_by
-from rcsc.lang.model import Bool, Call, Default, Kind, Statement
+from rcsc.lang.leaves import may_write
+from rcsc.lang.model import Bool, Default, Kind
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.search import halved
 from rcsc.proof.solvers.smt import Answer, Solver, Term
@@ -231,19 +231,7 @@ def lines_write(ts: TransitionSystem) -> list[str]:
 
 def of_lines(ts: TransitionSystem) -> set[str]:
     """Collect the leaves that the lines of all tables write."""
-    leaves = set()
-    for table in ts.program.tables:
-        every = [*(line.actions for line in table.lines), *([table.default.actions] if table.default else [])]
-        for actions in every:
-            for action in actions:
-                leaves |= _written(ts, action.statement)
-    return leaves
-
-
-def _written(ts: TransitionSystem, statement: Statement) -> set[str]:
-    leaves: set[str] = set()
-    for call in everything((statement,)):
-        leaves |= set(map(str, written_by(call)))
-        if isinstance(call, Call):
-            leaves |= set(map(str, ts.procedures[call.procedure].writes))
-    return leaves
+    lines = (line for table in ts.program.tables for line in table.every_line)
+    return set(
+        map(str, may_write((action.statement for line in lines for action in line.actions), ts.procedures))
+    )

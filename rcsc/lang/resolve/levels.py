@@ -25,6 +25,7 @@ each reads values of this cycle, and the order in which they are written means n
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Label
@@ -33,16 +34,14 @@ from rcsc.lang.expressions.previous import fresh
 from rcsc.lang.expressions.scope import Body, Scope, spell_number
 from rcsc.lang.expressions.typed import typed
 from rcsc.lang.expressions.types import constant
-from rcsc.lang.leaves import free_name, read_by
+from rcsc.lang.leaves import free_name, read_by, shortest_circle
 from rcsc.lang.model import (
     Assumption,
     Declared,
-    Default,
     Enum,
     Int,
     Kind,
     Level,
-    Line,
     OneTable,
     Procedure,
     Read,
@@ -184,8 +183,7 @@ def _written(
     """Map each leaf that tables or the postprocess may write to one writer."""
     writers: dict[str, str] = {}
     for table in tables:
-        lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
-        for line in lines:
+        for line in table.every_line:
             _, writes = touched([action.statement for action in line.actions], procedures)
             writers |= dict.fromkeys(map(str, writes), f"line `{line.name}` of table `{table.name}`")
     for name in after:
@@ -284,8 +282,7 @@ def _touched(choice: TableChoice, known: Declarations) -> _Touched:
         reads |= dict.fromkeys(map(str, read_by(choice.selector)), str(choice.names[0]))
     for name in choice.names:
         table = known.tables[name]
-        lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
-        actions = [action.statement for line in lines for action in line.actions]
+        actions = [action.statement for line in table.every_line for action in line.actions]
         read, write = touched(actions, known.procedures)
         told = [known.assumptions[own].condition for own in table.assumptions if own in known.assumptions]
         every = {*table.variables, *read, *(leaf for condition in told for leaf in read_by(condition))}
@@ -317,31 +314,19 @@ def _circle(
     scope: Scope, written: tree.LevelDecl, touched: Sequence[_Touched], waits: Mapping[int, Mapping[int, str]]
 ) -> None:
     """Report the shortest cycle of clauses that wait for each other; each clause given waits for another of them."""
-    steps = min((_way_back(start, waits) for start in waits), key=len)
-    words = [
-        f"`{touched[reader].reads[leaf]}` reads `{leaf}`, which `{touched[writer].writes[leaf]}` writes"
-        for reader, leaf, writer in steps
-    ]
-    leaf = steps[-1][1]
+    circle = shortest_circle({at: [other for other in waits[at] if other in waits] for at in waits})
+    words = []
+    for reader, writer in pairwise(circle):
+        leaf = waits[reader][writer]
+        words.append(
+            f"`{touched[reader].reads[leaf]}` reads `{leaf}`, which `{touched[writer].writes[leaf]}` writes"
+        )
     scope.report(
         Code.TABLE_CYCLE,
         f"the tables of level `{written.name.text}` wait for each other: {'; '.join(words)}",
         written.name.span,
         f"one of them reads what the cycle before left: `was {leaf}`",
     )
-
-
-def _way_back(start: int, waits: Mapping[int, Mapping[int, str]]) -> list[tuple[int, str, int]]:
-    """Return the shortest cycle of waits from a clause back to it; where there is none, a path longer than any cycle."""
-    ways: dict[int, list[tuple[int, str, int]]] = {start: []}
-    for reader in (queue := [start]):
-        for writer, leaf in waits[reader].items():
-            if writer == start:
-                return [*ways[reader], (reader, leaf, writer)]
-            if writer in waits and writer not in ways:
-                ways[writer] = [*ways[reader], (reader, leaf, writer)]
-                queue.append(writer)
-    return [(start, "", start)] * (len(waits) + 1)
 
 
 def lines_kept(scope: Scope, levels: Iterable[Level], tables: Iterable[Table], file: str) -> tuple[Enum, ...]:
@@ -367,7 +352,7 @@ def _members(lines: Sequence[str]) -> Iterator[str]:
 
 
 def _line_kept(scope: Scope, table: Table, file: str) -> Enum:
-    none, *lines = _members([str(line.name) for line in (*table.lines, table.default) if line is not None])
+    none, *lines = _members([str(line.name) for line in table.every_line])
     name = fresh(scope, f"line_of_{table.name}")
     kind = Enum(name, (none, *lines), file)
     leaf, doc = (

@@ -22,7 +22,7 @@ from rcsc.lang.expressions.conditions import box_of
 from rcsc.lang.expressions.scope import Scope
 from rcsc.lang.expressions.words import Mask, mask_of
 from rcsc.lang.interval_sets import boxes_of, meet
-from rcsc.lang.leaves import is_finite, read_by
+from rcsc.lang.leaves import is_finite, read_by, shortest_circle
 from rcsc.lang.model import (
     Apply,
     Box,
@@ -233,26 +233,7 @@ def _reached(name: str, edges: Mapping[str, Collection[str]]) -> set[str]:
 
 
 def _circle(edges: Mapping[str, Collection[str]]) -> list[str]:
-    """Return a shortest circle, with its first line at both ends; empty where there is none."""
-    circles = [path for name in edges if (path := _back(name, edges))]
-    return min(circles, key=len, default=[])
-
-
-def _back(name: str, edges: Mapping[str, Collection[str]]) -> list[str]:
-    """Return a shortest way from a line back to it; empty where there is none."""
-    came: dict[str, str] = {}
-    waiting = [name]
-    for at in waiting:
-        for lower in sorted(edges[at]):
-            if lower == name:
-                path = [name, at]
-                while path[-1] != name:
-                    path.append(came[path[-1]])
-                return [*reversed(path)] if at != name else [name, name]
-            if lower not in came:
-                came[lower] = at
-                waiting.append(lower)
-    return []
+    return shortest_circle({name: sorted(lower) for name, lower in edges.items()})
 
 
 def _report_circle(scope: Scope, written: tree.TableDecl, circle: list[str]) -> None:

@@ -10,18 +10,15 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.scope import Body, Scope, root_of
 from rcsc.lang.expressions.typed import path_of
 from rcsc.lang.expressions.types import scalar_of
-from rcsc.lang.leaves import everything, expressions, parts, read_by, written_by
+from rcsc.lang.leaves import everything, expressions, is_part, read_by, reads_of, written_by
 from rcsc.lang.model import (
     Call,
-    Expr,
     Extern,
     Kind,
     Parameter,
     Procedure,
     ProcedureName,
-    Read,
     Scalar,
-    Select,
     Statement,
     VariableName,
     pending,
@@ -29,7 +26,7 @@ from rcsc.lang.model import (
 from rcsc.lang.protocol.written import AFTER, BEFORE
 from rcsc.lang.reserved import C_COMPOSED, C_KEYWORDS, C_MACROS
 from rcsc.lang.resolve.declarations import requirements
-from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, below, cost
+from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, cost
 from rcsc.lang.syntax import tree
 
 MOST_CALLS = 100
@@ -125,7 +122,7 @@ def _procedure(
 ) -> Procedure:
     reads, writes = touched(body[1], known)
     if written.kind != "procedure":
-        before = _previous(scope, reads)
+        before = {hidden: name for name, hidden in scope.previous.items() if hidden in reads}
         declared_reads = _places(scope, written.reads, writing=False)
         declared_writes = _places(scope, written.writes, writing=True)
         if written.kind == "module":
@@ -145,11 +142,6 @@ def _procedure(
         written.name.span,
         requirements(scope, written.requirements),
     )
-
-
-def _previous(scope: Scope, reads: set[VariableName]) -> dict[VariableName, VariableName]:
-    """Return the hidden states among the leaves that are read, each with its leaf."""
-    return {hidden: name for name, hidden in scope.previous.items() if hidden in reads}
 
 
 def touched(
@@ -182,7 +174,7 @@ def _places(scope: Scope, written: tuple[tree.Expr, ...], writing: bool) -> set[
             scope.report(Code.NOT_CONSTANT, "the index of a declared path is a constant", place.span)
         own = scope.declared[root].leaves
         every = (*own, *(pending(name) for name in own if name in scope.deferred))
-        leaves.update(name for name in every if below(name, path.names[0]))
+        leaves.update(name for name in every if is_part(name, path.names[0]))
     return leaves
 
 
@@ -196,19 +188,13 @@ def _check_declared(
     """Report each place where a module touches a leaf that it does not declare."""
     for statement in everything(body):
         for expr in expressions(statement):
-            for names, span in _reading(expr):
+            for names, span in reads_of(expr):
                 _undeclared(scope, "reads", set(names) - reads, span)
         _undeclared(scope, "writes", set(written_by(statement)) - writes, statement.span)
         if isinstance(statement, Call) and statement.procedure in known:
             callee = known[statement.procedure]
             _undeclared(scope, "reads", set(callee.reads) - reads, statement.span)
             _undeclared(scope, "writes", set(callee.writes) - writes, statement.span)
-
-
-def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
-    for part in parts(expr):
-        if isinstance(part, Read | Select):
-            yield (part.name,) if isinstance(part, Read) else part.leaves, part.span
 
 
 def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:

@@ -7,6 +7,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.expressions.previous import adopted_before
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, typed
+from rcsc.lang.leaves import is_part
 from rcsc.lang.model import (
     Assumption,
     AssumptionName,
@@ -84,7 +85,7 @@ def _fields(what: str, fields: Sequence[tree.LinkField], record: str, scope: Sco
     for part in fields:
         field = f"{record}.{part.name.text}"
         leaves = {
-            name.removeprefix(field): leaf for name, leaf in scope.leaves.items() if _part_of(name, field)
+            name.removeprefix(field): leaf for name, leaf in scope.leaves.items() if is_part(name, field)
         }
         kinds = "; ".join(f"{name.lstrip('.')} {_kind(leaf.type)}".lstrip() for name, leaf in leaves.items())
         says = [*([part.word] if part.word else []), kinds]
@@ -111,7 +112,7 @@ def _kind(kind: Scalar) -> str:
 def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
     records = [f"{order}.{part}" for part in party.numbered]
     numbered = tuple(
-        leaf for leaf in map(VariableName, scope.leaves) if any(_part_of(leaf, r) for r in records)
+        leaf for leaf in map(VariableName, scope.leaves) if any(is_part(leaf, r) for r in records)
     )
     late = VariableName(f"{party.name}.late") if party.bounded else None
     reason = VariableName(f"{report}.{party.reason}") if party.reason is not None else None
@@ -120,10 +121,6 @@ def _role(party: Party, order: str, report: str, scope: Scope) -> Role:
     in_time = party.answered is not None
     said = _link(link, order, report, scope)
     return Role(party.name, order, report, numbered, *words, reason, late, answers_in_time=in_time, link=said)
-
-
-def _part_of(leaf: str, record: str) -> bool:
-    return leaf == record or leaf.startswith((f"{record}.", f"{record}["))
 
 
 def restart_of(

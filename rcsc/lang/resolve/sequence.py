@@ -15,13 +15,12 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.scope import Scope
-from rcsc.lang.leaves import expressions, may_write, parts
+from rcsc.lang.leaves import expressions, may_write, reads_of
 from rcsc.lang.model import (
     Action,
     Assign,
     Procedure,
     Read,
-    Select,
     Statement,
     Table,
     ToElement,
@@ -55,14 +54,9 @@ def _line(scope: Scope, actions: tuple[Action, ...], procedures: Mapping[str, Pr
 
 def _read(statement: Statement) -> list[tuple[VariableName, Span]]:
     """Return the leaves that the cell itself reads, with their places; not those that a called procedure reads."""
-    found: list[tuple[VariableName, Span]] = []
-    for expr in expressions(statement):
-        for part in parts(expr):
-            if isinstance(part, Read):
-                found.append((part.name, part.span))
-            elif isinstance(part, Select):
-                found += [(name, part.span) for name in part.leaves]
-    return found
+    return [
+        (name, span) for expr in expressions(statement) for names, span in reads_of(expr) for name in names
+    ]
 
 
 def _nothing(statement: Statement) -> bool:

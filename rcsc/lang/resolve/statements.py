@@ -9,10 +9,9 @@ from rcsc.lang.expressions.operators import Typed, common_unit, conversion, kind
 from rcsc.lang.expressions.scope import Body, Scope, root_of, spell_number
 from rcsc.lang.expressions.typed import Path, boolean, path_of, typed
 from rcsc.lang.expressions.types import constant, scalar_of
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import is_part, read_by
 from rcsc.lang.model import (
     Arm,
-    Array,
     Assign,
     Bool,
     Call,
@@ -28,19 +27,17 @@ from rcsc.lang.model import (
     ProcedureName,
     Read,
     Real,
-    Record,
     Scalar,
     Select,
     Statement,
     ToElement,
     ToLeaf,
     ToLocal,
-    Type,
     Value,
     VariableName,
     pending,
 )
-from rcsc.lang.resolve.variables import fits
+from rcsc.lang.resolve.variables import fits, scalars
 from rcsc.lang.restart import COMMAND, NUMBER
 from rcsc.lang.syntax import tree
 
@@ -214,7 +211,7 @@ class Statements:
         if origin.type != target.type:
             self.scope.report(Code.KIND, "a record or array is assigned from one of the same type", span)
             return ()
-        suffixes = _suffixes(target.type)
+        suffixes = [(suffix, kind) for suffix, kind, _ in scalars("", target.type)]
         if self._refused(target, origin, len(suffixes), span):
             return ()
         copies: list[Statement] = []
@@ -237,7 +234,7 @@ class Statements:
             self.scope.report(Code.LOOP_TOO_LONG, message, span)
             return True
         used = {name for path in (target, origin) if path.index for name in read_by(path.index)}
-        own = [name for name in used if any(below(name, written) for written in target.names)]
+        own = [name for name in used if any(is_part(name, written) for written in target.names)]
         if own:
             message = f"the index reads `{min(own)}`, which this assignment changes"
             self.scope.report(Code.KIND, message, span, "keep the index in a local first")
@@ -347,21 +344,6 @@ class Statements:
 def _part(record: str, name: tree.Name) -> tree.Expr:
     """Return a field of a variable, at the place of its name."""
     return tree.FieldOf(tree.Reference(replace(name, text=record), name.span), name, name.span)
-
-
-def _suffixes(kind: Type, prefix: str = "") -> list[tuple[str, Scalar]]:
-    match kind:
-        case Array(length, element):
-            return [pair for at in range(length) for pair in _suffixes(element, f"{prefix}[{at}]")]
-        case Record(fields=fields):
-            return [pair for part in fields for pair in _suffixes(part.type, f"{prefix}.{part.name}")]
-        case _:
-            return [(prefix, kind)]
-
-
-def below(leaf: str, path: str) -> bool:
-    """Return whether the leaf is the path or a part of it."""
-    return leaf == path or leaf.startswith((f"{path}.", f"{path}["))
 
 
 def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:

@@ -129,7 +129,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
             Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span
         )
         return
-    flat = list(_leaves(written.name.text, kind))
+    flat = list(scalars(written.name.text, kind))
     if max((len(name) for name, _, _ in flat), default=0) > MOST_NAME:
         message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
         scope.report(Code.LONG_NAME, message, written.name.span)
@@ -179,15 +179,15 @@ def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
         scope.leaves[name] = replace(scope.leaves[name], deferred_until=until)
 
 
-def _leaves(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple[str, Scalar, Value | None]]:
+def scalars(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple[str, Scalar, Value | None]]:
     """Yield the scalar parts, each with the initial value from its record."""
     match kind:
         case Array(length, inner):
             for at in range(length):
-                yield from _leaves(f"{name}[{at}]", inner, first)
+                yield from scalars(f"{name}[{at}]", inner, first)
         case Record(fields=fields):
             for part in fields:
-                yield from _leaves(f"{name}.{part.name}", part.type, part.initial)
+                yield from scalars(f"{name}.{part.name}", part.type, part.initial)
         case _:
             yield name, kind, first
 
