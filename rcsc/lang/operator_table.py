@@ -213,6 +213,11 @@ Signed: TypeAlias = Callable[[bool], T]
 """A condition, or (given false) its negation."""
 
 
+def signed(value: T, negated: Callable[[T], T]) -> Signed[T]:
+    """Return a condition, with how it is negated."""
+    return lambda wanted: value if wanted else negated(value)
+
+
 def truth_function(
     op: Op,
     left: Signed[T],

@@ -24,7 +24,7 @@ from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_ma
 from rcsc.compose.counterexample.cycle_run import broken, seen_by_table
 from rcsc.compose.counterexample.finding import Finding, beginnings, of_trace, rows
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
-from rcsc.compose.counterexample.pair import broken_together
+from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import helps, weakest_condition
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceResult, TraceSearch, traces
@@ -599,7 +599,7 @@ def test_numbers_taken_from_the_last_echo_lose_a_command() -> None:
     """Two orders before an echo have one number: the level below never sees the second, and says that it is done."""
     made = transition_systems(LAST_ECHO)
     upper, lower = made["upper"], made["lower"]
-    found = broken_together(upper, lower, upper.links.below[0], LEGAL)
+    found, _ = followed_together(upper, lower, upper.links.below[0], LEGAL)
     assert isinstance(found, Finding)
     assert found.obligation.sort is Sort.SAME_ORDER
     ran = [(row.level, row.line) for row in rows(made, found)]
@@ -617,14 +617,17 @@ def test_the_same_numbers_in_order_lose_none() -> None:
     for path, level in ((FIRST_MATCH, "upper"), (SYSTEM, "upper")):
         made = transition_systems(path)
         upper = made[level].of(first_match(made[level].program))
-        assert broken_together(upper, made["lower"], upper.links.below[0], replace(LEGAL, most=4)) is None
+        assert followed_together(upper, made["lower"], upper.links.below[0], replace(LEGAL, most=4)) == (
+            None,
+            (),
+        )
 
 
 def test_a_report_about_another_order_is_found_together(tmp_path: Path) -> None:
     other = small_text("lower", ("ref_command_echo := command.input_command", "ref_command_echo := go"))
     made = transition_systems(small_system(tmp_path, lower=other))
     upper, lower = made["upper"], made["lower"]
-    found = broken_together(upper, lower, upper.links.below[0], LEGAL)
+    found, _ = followed_together(upper, lower, upper.links.below[0], LEGAL)
     assert isinstance(found, Finding)
     assert (found.level, found.obligation.sort, len(found.ticks)) == ("upper", Sort.OF_ITS_ORDER, 2)
 
@@ -640,7 +643,7 @@ def test_what_falls_to_default_is_found_where_it_is_asked_for(published: Looked)
 
 def test_a_two_level_finding_is_a_log_of_both(tmp_path: Path) -> None:
     made = transition_systems(LAST_ECHO)
-    found = broken_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
+    found, _ = followed_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
     assert isinstance(found, Finding)
     assert (
         make([ts.program for ts in made.values()], tmp_path, altered=False) == ()
@@ -673,7 +676,7 @@ def test_a_case_does_not_say_what_its_own_levels_give_each_other() -> None:
     assert [sorted(tick) for tick in json.loads(text)["ticks"]] == [["lower", "upper"]] * 3
     assert [tick["lower"] for tick in json.loads(text)["ticks"]] == [{}, {}, {}]
     made = transition_systems(LAST_ECHO)
-    found = broken_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
+    found, _ = followed_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
     assert isinstance(found, Finding)
     case = REPO / "tests" / "findings" / "any.json"
     assert json.loads(frozen(found, made, LAST_ECHO, case))["ticks"] == json.loads(text)["ticks"]

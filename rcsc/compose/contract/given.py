@@ -29,11 +29,6 @@ ExternAnswer: TypeAlias = tuple[str, tuple[Value, ...]]
 REFUSED_NOW_AND_THEN = 0.04
 
 
-def may_be_refused(variable: Variable) -> bool:
-    """Return whether a function can return a value that is refused; numbers may be clamped, NaN never."""
-    return variable.admit is not Admit.CLAMP or isinstance(variable.type, Real)
-
-
 def refused(variable: Variable) -> Value:
     """Return a value that is refused: the one after the greatest, or NaN."""
     if isinstance(variable.type, Real):
@@ -66,7 +61,9 @@ def at_random(program: Program, random: Random) -> Iterator[None]:
     """Answer each call of an extern procedure with random values of its types, and now and then a refused one."""
 
     def result(variable: Variable) -> Value:
-        if may_be_refused(variable) and random.random() < REFUSED_NOW_AND_THEN:
+        # a NaN is not clamped
+        refusable = variable.admit is not Admit.CLAMP or isinstance(variable.type, Real)
+        if refusable and random.random() < REFUSED_NOW_AND_THEN:
             return refused(variable)
         low, high = key_bounds(variable.type)
         if isinstance(variable.type, Enum) or high - low < 64:

@@ -199,16 +199,13 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     as_before = values.all_of(  # after a refused result the report may be as late as if the level had not run
         values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves_under(ts.program, above.report)
     )
-    stood = not cycle.anew or _echo_stands(ts, above)
+    # without the echo that a restart keeps in the report, an older report may follow a newer one
+    kept = (ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed))
+    stood = not cycle.anew or all(kept)
     late = values.all_of((cycle.refused, as_before, values.truth(stood)))
     yield Obligation(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
     if ts.program.roles is None:
         yield from _answer_stays(ts, cycle, above)
-
-
-def _echo_stands(ts: TransitionSystem, above: Above) -> bool:
-    """Return whether a restart keeps the echo in the report: else an older report may follow a newer one."""
-    return all(ts.program.adopted.get(leaf) == Stands() for leaf in (above.echo, above.echoed))
 
 
 def _answer_stays(ts: TransitionSystem, cycle: Cycle, above: Above) -> Iterator[Obligation]:

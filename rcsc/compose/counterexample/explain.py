@@ -129,7 +129,9 @@ def explain(
                 *_together(systems, level.level, level.open, settings),
                 *_endless(systems[level.level], level, settings),
             ):
-                yield rerun.run(_supposing(systems, explanation, settings.system))
+                finding = explanation.finding
+                given = {} if finding is None else supposed(settings.system, systems, finding)
+                yield rerun.run(replace(explanation, supposes=given))
 
 
 def _level(
@@ -175,15 +177,6 @@ def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]
     for finding in at_first(ts.program) if obligation.sort is Sort.INVARIANT else ():
         if finding.message.endswith(f"`{obligation.name}`") and finding.code is Code.INVARIANT_INITIAL:
             yield " ".join((finding.message, *(f"({note})" for note in finding.notes)))
-
-
-def _supposing(
-    systems: Mapping[str, TransitionSystem], explanation: Explanation, system: Description
-) -> Explanation:
-    """Add the values of other levels that the run of one level supposes."""
-    if explanation.finding is None:
-        return explanation
-    return replace(explanation, supposes=supposed(system, systems, explanation.finding))
 
 
 def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -> Finding | None:

@@ -60,17 +60,6 @@ class _Side:
         return [name for name in self.ts.inputs if name not in self.takes]
 
 
-def broken_together(
-    upper: TransitionSystem,
-    lower: TransitionSystem,
-    below: Below,
-    search: TraceSearch,
-    begins: Starts = MappingProxyType({}),
-) -> Finding | NotReproducedError | None:
-    """Return the finding of `followed_together`, without its consequences."""
-    return followed_together(upper, lower, below, search, begins)[0]
-
-
 def followed_together(
     upper: TransitionSystem,
     lower: TransitionSystem,

@@ -30,7 +30,6 @@ from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding
-from rcsc.run.signature import Values
 from rcsc.run.system import Kind, System, executors, signatures
 
 KINDS: tuple[Kind, ...] = ("python", "c")
@@ -273,18 +272,10 @@ def _beside(
         if step.after[leaf.name] != value:
             then = spell(ts.kinds[leaf.name], step.after[leaf.name])
             yield f"{there}: `{leaf.name}` = {then} by the interpreter, {leaf.shown(value)} by the {who} executor"
-    expected, did = _traced(step, level.sign.monitored), _did(level, level.values)
+    expected = _spelled(step.line, step.fault, [name for name in level.sign.monitored if name in step.failed])
+    did = _spelled(level.line, Fault(level.fault), level.sign.failures(level.values))
     if expected != did:
         yield f"{there}: {expected} by the interpreter, {did} by the {who} executor"
-
-
-def _traced(step: CycleRun, monitored: Sequence[str]) -> str:
-    failed = [name for name in monitored if name in step.failed]
-    return _spelled(step.line, step.fault, failed)
-
-
-def _did(level: RunningLevel, values: Values) -> str:
-    return _spelled(level.line, Fault(level.fault), level.sign.failures(values))
 
 
 def _spelled(line: str, fault: Fault, failed: Sequence[str]) -> str:

@@ -19,21 +19,11 @@ from rcsc.proof.symbolic.keyed import Keyed
 from rcsc.proof.symbolic.values import Node
 
 
-class _Bits(Bits):
-    """Knows which nodes it has met."""
-
-    __slots__ = ()
-
-    def met(self, node: Node) -> bool:
-        """Return whether anything stated or asked contains the node."""
-        return node in self._words
-
-
 @dataclass(slots=True)
 class Bounded:
     """Conditions on a run of so many cycles, as clauses; none is ever taken back."""
 
-    _bits: _Bits = field(default_factory=_Bits)
+    _bits: Bits = field(default_factory=Bits)
     _sat: Sat = field(default_factory=lambda: Sat([]))
     _asked: list[Node] = field(default_factory=list)
 

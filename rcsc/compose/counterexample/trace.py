@@ -249,7 +249,9 @@ class Unrolled:
         if _breaks(self.ts, obligation, trace, len(given)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()
-        return NotReproducedError(obligation.shown, guessed=self.guessed or self._asks, beside=beside)
+        # it may be about the results of extern procedures in the cycle after the last
+        asks = any(cycle.calls for cycle in self.cycles)
+        return NotReproducedError(obligation.shown, guessed=self.guessed or asks, beside=beside)
 
     def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
         """Return every leaf before the simplest run that ends so, and the inputs and extern results of each cycle.
@@ -263,11 +265,6 @@ class Unrolled:
     def guessed(self) -> bool:
         """Whether an operation was left open."""
         return self._run.guessed
-
-    @property
-    def _asks(self) -> bool:
-        """Whether extern procedures are called: an obligation may be about their results in the cycle after the last."""
-        return any(cycle.calls for cycle in self.cycles)
 
     def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
         start = self._begins(settled)

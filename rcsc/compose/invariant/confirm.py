@@ -37,11 +37,11 @@ class Confirmation:
     keyed: Keyed
     limits: Limits
     rested_on: list[Solver] = field(default_factory=list)
-    _literals: dict[tuple[bool, int, int], Term] = field(default_factory=dict)
-    _nodes: dict[tuple[bool, int], Node] = field(default_factory=dict)
-    _kept: dict[tuple[bool, Clause], Term] = field(default_factory=dict)
-    _denied: dict[Clause, Term] = field(default_factory=dict)
-    _ended: dict[tuple[int, int], Term] = field(default_factory=dict)
+    _literals: dict[tuple[bool, int, int], Term] = field(init=False, default_factory=dict)
+    _nodes: dict[tuple[bool, int], Node] = field(init=False, default_factory=dict)
+    _kept: dict[tuple[bool, Clause], Term] = field(init=False, default_factory=dict)
+    _denied: dict[Clause, Term] = field(init=False, default_factory=dict)
+    _ended: dict[tuple[int, int], Term] = field(init=False, default_factory=dict)
 
     def literal(self, at: int, value: int, *, after: bool) -> Term:
         """Return the term that a predicate has a value before or after the cycle; for `~value`, that it has another."""
@@ -79,25 +79,17 @@ class Confirmation:
 
     def known(self, clauses: Sequence[Clause]) -> Solver:
         """Return a solver with one cycle that starts where the clauses hold; further questions may need more `ranges`."""
-        held = [self._held(clause) for clause in clauses if not self._cannot_break(clause)]
+        # a clause about values that a predicate never has before the cycle, such as another command, tells nothing
+        telling = (clause for clause in clauses if not any(self._never(at, value) for at, value in clause))
+        held = [self._held(clause) for clause in telling]
         contract = self.keyed.term(self.cycle.contract)
         solver = Solver(self.limits, remembers=True)
         solver.add(*self.keyed.ranges, contract, *held)
         return solver
 
-    def _cannot_break(self, clause: Clause) -> bool:
-        """Return whether the clause is about values that a predicate never has before the cycle, such as another command."""
-        return any(self._never(at, value) for at, value in clause)
-
     def _never(self, at: int, value: int) -> bool:
         node = self.node(at, after=False)
         return node.known and (node.low != value if value >= 0 else node.low == ~value)
-
-    def in_other_terms(self, keyed: Keyed) -> "Confirmation":
-        """Return the same questions in other terms."""
-        return Confirmation(
-            self.predicates, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
-        )
 
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
         """Ask whether a cycle in this case breaks a clause: unsatisfiable if the clauses are an invariant."""

@@ -9,7 +9,7 @@ weights of a sum are guessed from cycles that the solver shows, and then asked a
 
 import sys
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import product
 from operator import attrgetter
@@ -140,7 +140,7 @@ def lines_that_stop(
     settled: tuple[str, ...] = ()
     rested_on = [ranking.solver]
     if ranking.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
-        first = ranking = _Ranking(program, asked.in_other_terms(Measured()), clauses, free, first)
+        first = ranking = _Ranking(program, replace(asked, keyed=Measured()), clauses, free, first)
         rested_on.append(ranking.solver)
     if ranking.endless:
         read = _read_again(program, free)
@@ -272,8 +272,9 @@ class _Ranking:
             for falls in (False, True)
         ]
         self.counted: list[tuple[RisingLine, ...]] = []
-        always, self.always = smt.truth(True), set(_every_step(len(self.now)))
-        self.open = set(range(len(self.now))) if weaker is None else weaker.endless
+        lines = range(len(self.now))
+        always, self.always = smt.truth(True), set(product(lines, lines))
+        self.open = set(lines) if weaker is None else weaker.endless
         if weaker is None:
             self.always = self._steps(always, self.always)
         else:
@@ -420,7 +421,7 @@ class _Ranking:
                     return RisingLine(self._name(line), number.name, falls=falls), number
                 if answer is Answer.UNKNOWN:
                     return None
-                guesses.never_falls(self._differences(whole))
+                guesses.at_least(self._differences(whole), 0)
         return None
 
     def _name(self, line: int) -> str:
@@ -453,17 +454,13 @@ class _Guesses:
     """Weights of a sum that rises in one cycle and falls in none that was shown; each is a guess."""
 
     def __init__(self, count: int, most: int, rise: Sequence[int]) -> None:
-        kind = Int(-most, most)
+        self._kind = kind = Int(-most, most)
         self._solver = smt.Solver()
         self._weights = [smt.variable(f"weight {at}", kind) for at in range(count)]
         for weight in self._weights:
-            self._solver.add(*(smt.at_most(*pair, kind) for pair in self._within(weight, kind)))
-        self._kind = kind
-        self._at_least(rise, 1)
-
-    @staticmethod
-    def _within(weight: Term, kind: Int) -> tuple[tuple[Term, Term], ...]:
-        return (smt.literal(kind, kind.low), weight), (weight, smt.literal(kind, kind.high))
+            self._solver.add(smt.at_most(smt.literal(kind, kind.low), weight, kind))
+            self._solver.add(smt.at_most(weight, smt.literal(kind, kind.high), kind))
+        self.at_least(rise, 1)
 
     def __iter__(self) -> Iterator[list[int]]:
         for _ in range(MOST_GUESSES):
@@ -471,11 +468,8 @@ class _Guesses:
                 return
             yield [int(self._solver.value(weight, self._kind)) for weight in self._weights]
 
-    def never_falls(self, change: Sequence[int]) -> None:
-        """Leave out weights whose sum falls where the numbers change so."""
-        self._at_least(change, 0)
-
-    def _at_least(self, change: Sequence[int], least: int) -> None:
+    def at_least(self, change: Sequence[int], least: int) -> None:
+        """Leave out weights whose sum changes by less where the numbers change so."""
         changed = _sum_of(
             [(smt.literal(self._kind, by), weight) for by, weight in zip(change, self._weights, strict=True)]
         )
@@ -514,10 +508,6 @@ def owned(program: Program) -> list[tuple[str, Scalar]]:
     numbers = [v for v in program.variables if v.kind is Kind.STATE and isinstance(v.type, Int | Real)]
     later = [(str(pending(v.name)), v.type) for v in numbers if v.deferred_until is not None]
     return [*((str(v.name), v.type) for v in numbers), *later]
-
-
-def _every_step(lines: int) -> list[LinePair]:
-    return [(line, following) for line in range(lines) for following in range(lines)]
 
 
 def parts(steps: set[LinePair]) -> list[Part]:

@@ -7,6 +7,7 @@ table, it is a constant. So other tables vanish from the terms, and a question i
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
@@ -20,9 +21,7 @@ def while_it_stays(ts: TransitionSystem, asked: Confirmation, table: str) -> Con
     """Return the same questions about the cycles that keep the command and run the table."""
     before = ts.havoc() | _selecting(ts, table)
     cycle = ts.cycle(before, taken=_taken(ts, before, {}, " taken"))
-    return Confirmation(
-        asked.predicates, asked.firsts, cycle, cycle.cases, Keyed(), asked.limits, asked.rested_on
-    )
+    return replace(asked, cycle=cycle, cases=cycle.cases, keyed=Keyed())
 
 
 def in_a_row(

@@ -245,7 +245,10 @@ class Flow:
         )
         table = str(self.tables[number].table.name)
         known = stopping.counted, stopping.still, stopping.endless, stopping.settled
-        around = (*([self._tables_in_words()] if loops else []), *self._loops_in_words(number))
+        together = ", ".join(
+            f"`{self.tables[at].table.name}`" for at in sorted(self._looping_tables() if loops else ())
+        )
+        around = (*([f"tables {together}"] if loops else []), *self._loops_in_words(number))
         return Ending(table, None if loops else changes, *known, around)
 
     def wanted_to_stand(self) -> list[Node]:
@@ -264,10 +267,6 @@ class Flow:
         solver.add(*self.asked.keyed.ranges)
         self.asked.rested_on.append(solver)
         return not may(solver, broken)
-
-    def _tables_in_words(self) -> str:
-        names = (f"`{self.tables[number].table.name}`" for number in sorted(self._looping_tables()))
-        return f"tables {', '.join(names)}"
 
     def _loops_in_words(self, number: int) -> Iterator[str]:
         """Spell the states of each loop on which the command may be unanswered: the leaves that are not the same in all."""

@@ -49,9 +49,9 @@ from rcsc.lang.operator_table import (
     Logic,
     Op,
     Operator,
-    Signed,
     is_comparison,
     is_logic,
+    signed,
     truth_function,
 )
 from rcsc.lang.syntax import tree
@@ -279,18 +279,11 @@ def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
 
 
 def _logic(op: Logic, left: Box, right: Box, low: int, high: int) -> Box:
+    first, second = (signed(box, lambda box: complement(box, low, high)) for box in (left, right))
     whole = truth_function(
-        op,
-        _signed(left, low, high),
-        _signed(right, low, high),
-        lambda boxes: meet(*boxes),
-        lambda boxes: joined(boxes[0] + boxes[1]),
+        op, first, second, lambda boxes: meet(*boxes), lambda boxes: joined(boxes[0] + boxes[1])
     )
     return whole(True)
-
-
-def _signed(box: Box, low: int, high: int) -> Signed[Box]:
-    return lambda wanted: box if wanted else complement(box, low, high)
 
 
 def _compared(op: Comparison, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:

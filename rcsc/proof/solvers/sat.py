@@ -18,13 +18,6 @@ class GaveUpError(Exception):
     """The solver did not decide; nothing may rest on the question."""
 
 
-@cache
-def _pysat() -> Any:
-    from pysat import solvers
-
-    return solvers
-
-
 def _simplified(clauses: Iterable[list[int]], read: Iterable[int]) -> list[list[int]]:
     """Return clauses that are equivalent for the variables read; others are eliminated where that takes no more clauses.
 
@@ -62,8 +55,10 @@ class Sat:
             clauses: Each a list of literals, one of which holds.
             read: All literals that are added, assumed or read later, but new variables; by default any may be.
         """
+        from pysat.solvers import Minisat22
+
         kept = list(read)
-        self._solver: Any = _pysat().Minisat22(bootstrap_with=_simplified(clauses, kept) if kept else clauses)
+        self._solver: Any = Minisat22(bootstrap_with=_simplified(clauses, kept) if kept else clauses)
         self._model: list[int] = []
         self.queries = 0
 

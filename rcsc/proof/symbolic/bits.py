@@ -63,6 +63,10 @@ class Bits:
         """Return the literal of a truth value."""
         return self.word(node)[0]
 
+    def met(self, node: Node) -> bool:
+        """Return whether anything that was asked for contains the node."""
+        return node in self._words
+
     def equals(self, word: Word, kind: Scalar, key: int) -> Literal:
         """State that a word of the kind has this key."""
         if isinstance(kind, Bool):
@@ -90,9 +94,6 @@ class Bits:
             conjunction = self.both(conjunction, literal)
         return conjunction
 
-    def _either(self, a: Literal, b: Literal) -> Literal:
-        return -self.both(-a, -b)
-
     def _same(self, a: Literal, b: Literal) -> Literal:
         """State that they are equal."""
         if a in (TRUE, FALSE) or b in (TRUE, FALSE):
@@ -114,7 +115,7 @@ class Bits:
         if when == FALSE:
             return orelse
         if then in (TRUE, FALSE) or orelse in (TRUE, FALSE) or then == -orelse:
-            return self._either(self.both(when, then), self.both(-when, orelse))
+            return -self.both(-self.both(when, then), -self.both(-when, orelse))
         if when < 0:
             when, then, orelse = -when, orelse, then
         key = (f"mux {when}", then, orelse)

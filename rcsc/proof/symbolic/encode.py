@@ -33,10 +33,10 @@ from rcsc.lang.operator_table import (
     Comparison,
     Op,
     Operator,
-    Signed,
     is_comparison,
     is_division,
     is_logic,
+    signed,
     truth_function,
 )
 from rcsc.proof.solvers import smt
@@ -78,7 +78,9 @@ def encode(expr: Expr, frame: Frame) -> Term:
             term = encode(subject, frame)
             kind = subject.type
             return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
-        case Apply(op=op, args=(number, Literal(value=by))) if is_division(op) and _splits(number, by):
+        case Apply(op=op, args=(number, Literal(value=by))) if (
+            is_division(op) and isinstance(number.type, Int) and number.type.low >= 0 and by > 0
+        ):
             return smt.part(op.value, encode(number, frame), int(by))
         case Apply(op=Op.AND, args=(_, Apply(op=Op.EQ | Op.NE) as last)) if mask_of(last) is not None:
             mask = mask_of(expr)
@@ -92,16 +94,11 @@ def encode(expr: Expr, frame: Frame) -> Term:
             return operation(op, args[0].type, [encode(arg, frame) for arg in args])
 
 
-def _splits(number: Expr, by: Value) -> bool:
-    """Return whether an integer is divided that is not below zero, by one above."""
-    return isinstance(number.type, Int) and number.type.low >= 0 and by > 0
-
-
 def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
     """Return the term of an operator over operands, the first of which is of type `kind`."""
     if is_logic(op):
-        whole = truth_function(op, _signed(terms[0]), _signed(terms[1]), smt.all_of, smt.any_of)
-        return whole(True)
+        left, right = (signed(term, smt.negation) for term in terms)
+        return truth_function(op, left, right, smt.all_of, smt.any_of)(True)
     if is_comparison(op):
         return _comparison(op, terms[0], terms[1], kind)
     match op:
@@ -126,10 +123,6 @@ def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
         case Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:
             arithmetic = smt.float_operation if isinstance(kind, Real) else smt.integer_operation
             return arithmetic(op.value, terms[0], terms[1])
-
-
-def _signed(term: Term) -> Signed[Term]:
-    return lambda wanted: term if wanted else smt.negation(term)
 
 
 def _comparison(op: Comparison, left: Term, right: Term, kind: Scalar) -> Term:

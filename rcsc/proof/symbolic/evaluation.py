@@ -152,7 +152,8 @@ class Evaluation:
         if self.path is FALSE or (good.known and good.low):
             self.settled += 1
         else:
-            self.obligations.append(Obligation(code, message, self._written_at(span), self.path, good))
+            there = span if span.file else self.cell  # an expression in a table's cell is found by the cell
+            self.obligations.append(Obligation(code, message, there, self.path, good))
 
     def owe_inside(
         self, code: Code, node: Node, ends: tuple[int | float, int | float], message: str, span: Span
@@ -164,10 +165,6 @@ class Evaluation:
             return node
         self.owe(code, message, span, values.inside(node, low, high))
         return values.narrowed(node, low, high)
-
-    def _written_at(self, span: Span) -> Span:
-        """Expressions in a table's cell are found by the cell."""
-        return span if span.file else self.cell
 
     def assume(self, condition: Node) -> None:
         """Use the bounds of what is known from the start; the asker asserts it."""

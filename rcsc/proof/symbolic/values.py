@@ -36,7 +36,7 @@ from rcsc.lang.operator_table import (
     Logic,
     Op,
     Ordering,
-    Signed,
+    signed,
     single,
     truth_function,
 )
@@ -194,13 +194,8 @@ def among(subject: Node, values: Sequence[Value]) -> Node:
 
 def logic(op: Logic, left: Node, right: Node) -> Node:
     """Return a truth function of two conditions."""
-
-    def signed(node: Node) -> Signed[Node]:
-        return lambda wanted: node if wanted else negation(node)
-
-    return truth_function(
-        op, signed(left), signed(right), lambda parts: both(*parts), lambda parts: either(*parts)
-    )(True)
+    first, second = (signed(node, negation) for node in (left, right))
+    return truth_function(op, first, second, all_of, any_of)(True)
 
 
 def compare(op: Comparison, left: Node, right: Node) -> Node:

@@ -58,6 +58,12 @@ def shown(program: Program, table: Table) -> list[Variable]:
     return [variable for variable in program.variables if variable.name in wanted]
 
 
+def named(table: Table, lines: Sequence[int]) -> str:
+    """Return the names of lines, for messages: ``lines `a`, `b` ``."""
+    names = ", ".join(f"`{table.lines[at].name}`" for at in lines)
+    return f"line{'s' if len(lines) > 1 else ''} {names}"
+
+
 def calculated(condition: Expr) -> Iterator[Expr]:
     """Yield what a condition calculates of doubles and singles, each whole."""
     waiting = [condition]
@@ -285,7 +291,7 @@ class _Alone:
             Overlap(*pair, self.least(known[pair], *(self.pairs[at][1] for at in pair), lines=pair))
             for pair in sorted(known)
         ]
-        return [*found, Undecided(f"whether {self._named(open_)} overlap")] if open_ else found
+        return [*found, Undecided(f"whether {named(self.table, open_)} overlap")] if open_ else found
 
     def met(self, known: dict[tuple[int, int], Snapshot], lines: Sequence[int]) -> bool:
         """Enter each pair of these lines with earlier ones, and an input that both match; return whether Z3 told of all."""
@@ -325,7 +331,7 @@ class _Alone:
                 doubtful.append(at)
             else:
                 found.append(DeadLine(at, assuming=without is Answer.SATISFIABLE))
-        return [*found, Undecided(f"whether {self._named(doubtful)} can match")] if doubtful else found
+        return [*found, Undecided(f"whether {named(self.table, doubtful)} can match")] if doubtful else found
 
     def matches_without(self, at: int) -> Answer:
         """Return whether a line matches somewhere without the assumptions that are not proved."""
@@ -366,10 +372,6 @@ class _Alone:
 
     def _under(self, names: tuple[AssumptionName, ...]) -> "_Alone":
         return _Alone(self.program, replace(self.table, assumptions=names), self.options)
-
-    def _named(self, lines: Sequence[int]) -> str:
-        names = ", ".join(f"`{self.table.lines[at].name}`" for at in lines)
-        return f"line{'s' if len(lines) > 1 else ''} {names}"
 
     # --- inputs that Z3 gives ----------------------------------------------------------
 

@@ -35,7 +35,7 @@ from rcsc.proof.solvers.smt import Answer, Term
 from rcsc.proof.symbolic import trial
 from rcsc.proof.symbolic.encode import encode
 from rcsc.proof.table.certificate import must_cover, tree_certificate
-from rcsc.proof.table.confirm import TableSolver, shown
+from rcsc.proof.table.confirm import TableSolver, named, shown
 from rcsc.proof.table.regions.atoms import Formula, Universe, assumptions_of, every, lines_of, some
 from rcsc.proof.table.regions.least import find, inside, least, meeting, negated, never, whole, widest
 from rcsc.proof.table.regions.region import Bounds, NoWitness, Only, Point, Question, Rests, Search
@@ -272,7 +272,7 @@ class _Decision:
         """Return the finding that the assumptions contradict each other, or that this is undecided; else nothing."""
         if not self.table.assumptions:
             return ()
-        possible = self.satisfiable(self.assumed)
+        possible = self.satisfiable()
         if possible is Answer.SATISFIABLE:
             return ()
         return (
@@ -376,12 +376,12 @@ class _Decision:
 
     # --- findings ----------------------------------------------------------------------
 
-    def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
-        """Return whether the formulas can hold together, without any assumption."""
-        point = find(self.universe, formulas)
+    def satisfiable(self) -> Answer:
+        """Return whether the assumptions can hold together."""
+        point = find(self.universe, self.assumed)
         if point is NoWitness.UNKNOWN:
             given_up = smt.gives_up("whether the assumptions can hold together")
-            return Answer.UNKNOWN if given_up else self.asked.holds(*terms)
+            return Answer.UNKNOWN if given_up else self.asked.holds()
         return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
     def overlaps(self, search: Search) -> list[_Found]:
@@ -542,17 +542,13 @@ class _Decision:
             elif answer is Answer.UNKNOWN:
                 doubtful.append(at)
         findings: list[TableFinding] = [DeadLine(at, dead[at]) for at in sorted(dead)]
-        return [*findings, Undecided(self.doubt(doubtful))] if doubtful else findings
+        doubt = Undecided(f"whether {named(self.table, doubtful)} can match")
+        return [*findings, doubt] if doubtful else findings
 
     def matches(self, at: int) -> Answer:
         """Ask Z3 whether a line can match, with a part of a question's steps: of doubles it may take all without an answer."""
         with smt.together(self.options.steps // _OF_A_LINE):
             return self.holds(self.asked.line(at))
-
-    def doubt(self, lines: Sequence[int]) -> str:
-        """Name the lines of which it is not known whether they match."""
-        names = ", ".join(f"`{self.table.lines[at].name}`" for at in lines)
-        return f"whether line{'s' if len(lines) > 1 else ''} {names} can match"
 
     def meeting(self, at: int, near: Point) -> Point | NoWitness:
         """Find an input that a line matches under the assumptions, first near another."""
