@@ -43,11 +43,7 @@ class Digests:
         hashed = hashlib.sha256(b"table\n")
         known: dict[int, str] = {}
         lines: list[tuple[object, ...]] = [
-            (
-                line.name,
-                [_stated(test, known) for test in line.tests if test is not None],
-                _statements(line.actions),
-            )
+            (line.name, [_stated(test, known) for test in line.stated], _statements(line.actions))
             for line in table.lines
         ]
         if table.default is not None:

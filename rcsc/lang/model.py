@@ -701,6 +701,16 @@ class Line:
     same: tuple[LineName, ...] = field(default=(), compare=False)
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
+    @property
+    def stated(self) -> tuple["Test", ...]:
+        """Its tests, without blank cells."""
+        return tuple(test for test in self.tests if test is not None)
+
+    @property
+    def conditions(self) -> tuple[Expr, ...]:
+        """The conditions of its tests: it matches when all hold."""
+        return tuple(test.condition for test in self.stated)
+
     def cell_span(self, column: int) -> Span:
         """Return the span of the condition cell in `column` (the span of the whole line if unknown)."""
         at_ = 2 * (column + 1)
@@ -769,7 +779,7 @@ class Table:
     @property
     def distinct_tests(self) -> tuple[Test, ...]:
         """Each test of the lines once, in order of the first line that has it."""
-        every = (test for line in self.lines for test in line.tests if test is not None)
+        every = (test for line in self.lines for test in line.stated)
         return tuple({id(test): test for test in every}.values())
 
     def added(self, line: Line) -> str:

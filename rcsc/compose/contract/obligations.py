@@ -439,14 +439,13 @@ def _asks_for(flag: str, line: Line) -> bool:
     """Return whether a cell of the line tests only the flag, for one value."""
     whole = ((0, 1),)
     return any(
-        test is not None and test.box not in (None, whole) and [*map(str, test.variables)] == [flag]
-        for test in line.tests
+        test.box not in (None, whole) and [*map(str, test.variables)] == [flag] for test in line.stated
     )
 
 
 def looks_for(leaf: str, line: Line) -> bool:
     """Return whether a cell of the line reads the leaf."""
-    return any(test is not None and leaf in map(str, read_by(test.condition)) for test in line.tests)
+    return any(leaf in map(str, read_by(condition)) for condition in line.conditions)
 
 
 def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Obligation:

@@ -198,13 +198,7 @@ def _read(ts: TransitionSystem) -> set[str]:
     """Collect the leaves that decide which line runs or that the contract is about, and their pending values."""
     program, level = ts.program, ts.level
     conditions = [assumption.condition for assumption in program.assumptions]
-    conditions += [
-        test.condition
-        for table in program.tables
-        for line in table.lines
-        for test in line.tests
-        if test is not None
-    ]
+    conditions += _tested(program)
     conditions += level.selectors
     leaves = {str(name) for condition in conditions for name in read_by(condition)}
     leaves |= {leaf for below in ts.links.below for leaf in (below.command, *below.held)}
@@ -212,6 +206,20 @@ def _read(ts: TransitionSystem) -> set[str]:
     return leaves | {
         str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in leaves
     }
+
+
+def _tested(program: Program) -> Iterator[Expr]:
+    """List the conditions of all lines."""
+    for table in program.tables:
+        for line in table.lines:
+            yield from line.conditions
+
+
+def _in_procedures(program: Program) -> Iterator[Expr]:
+    """List what the statements of all procedures calculate."""
+    for procedure in program.procedures:
+        for statement in everything(procedure.body):
+            yield from expressions(statement)
 
 
 def _computed(ts: TransitionSystem) -> Iterator[tuple[str, Procedure]]:
@@ -251,16 +259,7 @@ def _durations(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predica
     """Make predicates of whether conditions have held for the times that tables and procedures ask for."""
     program, seen = ts.program, set()
     counters = {v.name for v in program.variables if v.counts is not None}
-    tests = (
-        test.condition for table in program.tables for line in table.lines for test in line.tests if test
-    )
-    bodies = (
-        expr
-        for procedure in program.procedures
-        for statement in everything(procedure.body)
-        for expr in expressions(statement)
-    )
-    for condition in (*tests, *bodies) if counters else ():
+    for condition in (*_tested(program), *_in_procedures(program)) if counters else ():
         for part in parts(condition):
             match part:
                 case Apply(op=Op.GE, args=(Read(name=leaf), Literal())) if (
@@ -276,10 +275,10 @@ def _cells_looked_back_at(ts: TransitionSystem, inside: Container[str]) -> Itera
     """Make predicates of cells about the inputs of the cycle before, where a fact about their change carries them on."""
     kept, seen = looked_back_at(ts.program), set()
     for table in ts.program.tables:
-        for test in (test for line in table.lines for test in line.tests if test is not None):
-            before = renamed(test.condition, lambda name: kept.get(name, name))
+        for condition in (condition for line in table.lines for condition in line.conditions):
+            before = renamed(condition, lambda name: kept.get(name, name))
             name, leaves = spelled(before), set(map(str, read_by(before)))
-            if before == test.condition or name in seen or not all(leaf in inside for leaf in leaves):
+            if before == condition or name in seen or not all(leaf in inside for leaf in leaves):
                 continue
             seen.add(name)
             if always_defined(before) and not all(listed(ts.kinds[leaf]) for leaf in leaves):
@@ -334,14 +333,8 @@ def _decisions(program: Program) -> Iterator[Expr]:
 
 def compared(program: Program) -> Iterator[tuple[str, str]]:
     """Find pairs of leaves that a procedure or a deferral compares for equality."""
-    conditions: list[Expr] = [v.deferred_until for v in program.variables if v.deferred_until is not None]
-    conditions += [
-        expr
-        for procedure in program.procedures
-        for statement in everything(procedure.body)
-        for expr in expressions(statement)
-    ]
-    for condition in conditions:
+    conditions = (v.deferred_until for v in program.variables if v.deferred_until is not None)
+    for condition in (*conditions, *_in_procedures(program)):
         for part in parts(condition):
             match part:
                 case Apply(op=Op.EQ | Op.NE, args=(Read(name=left), Read(name=right))) if left != right:

@@ -46,9 +46,7 @@ def _first_match(table: Table) -> Table:
     if not meeting:
         return table
     earlier = {at: [before for before, after in meeting if after == at] for at in range(len(table.lines))}
-    conditions = [
-        conjunction(test.condition for test in line.tests if test is not None) for line in table.lines
-    ]
+    conditions = [conjunction(line.conditions) for line in table.lines]
     lines = []
     for at, line in enumerate(table.lines):
         test = _none_of(table, [conditions[other] for other in earlier[at]]) if earlier[at] else None

@@ -196,7 +196,7 @@ class Text:
         None where the budget ends first.
         """
         full = self._proved(program)
-        table = next(table for table in program.tables if table.name == self.table.name)
+        table = program.table(self.table.name)
         free = _free(program, replace(table, assumptions=()))
         if full is None or free == program:
             return full
@@ -260,9 +260,7 @@ def _names(table: Table) -> list[str]:
 
 def _tests(table: Table) -> Mapping[str, object]:
     """Return each line's conditions by its name; empty cells are left out, as `above` adds and takes such columns."""
-    return {
-        str(line.name): [test.condition for test in line.tests if test is not None] for line in table.lines
-    }
+    return {str(line.name): line.conditions for line in table.lines}
 
 
 def _free(program: Program, table: Table) -> Program:

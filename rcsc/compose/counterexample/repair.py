@@ -365,9 +365,7 @@ class _Harms:
     def _narrowing(self) -> tuple[str, ...]:
         """List the leaves that the lines whose cells are changed look at."""
         lines = [self.after.lines[at] for cell in self.changed for at in (cell.line, cell.other)]
-        read = {
-            str(name) for line in lines for test in line.tests if test is not None for name in test.variables
-        }
+        read = {str(name) for line in lines for test in line.stated for name in test.variables}
         return tuple(str(name) for name in self.table.variables if name in read)
 
 

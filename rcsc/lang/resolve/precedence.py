@@ -288,11 +288,7 @@ class _Lines:
     def __post_init__(self) -> None:
         self.boxes = [boxes_of(line.tests) for line in self.lines]
         self.masks = [
-            [
-                mask
-                for test in line.tests
-                if test is not None and (mask := mask_of(test.condition)) is not None
-            ]
+            [mask for condition in line.conditions if (mask := mask_of(condition)) is not None]
             for line in self.lines
         ]
         self.rows = {row.name: row for row in self.written.rows}
@@ -369,13 +365,13 @@ class _Lines:
     def _meeting(
         self, first: int, second: int, uppers: tuple[int, ...], *, same: bool, span: Span
     ) -> Meeting:
-        tests = [test for at in (first, second) for test in self.lines[at].tests if test is not None]
+        both = (*self.lines[first].conditions, *self.lines[second].conditions)
         none = [
-            negation(conjunction(test.condition for test in self.lines[upper].tests if test is not None))
+            negation(conjunction(self.lines[upper].conditions))
             for upper in uppers
             if not self._apart(first, upper) and not self._apart(second, upper)
         ]
-        where = conjunction([*(test.condition for test in tests), *none])
+        where = conjunction([*both, *none])
         return Meeting(self.lines[first].name, self.lines[second].name, where, same, span)
 
     def _uppers(self, at: int) -> list[int]:

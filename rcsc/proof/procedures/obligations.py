@@ -369,7 +369,7 @@ class Obligations:
     def _line(self, table: Table, line: Line | Default, assumed: list[Node]) -> tuple[Run, Known]:
         base = [*assumed, *self._invariants()]
         if isinstance(line, Line):
-            base += self._known(test.condition for test in line.tests if test is not None)
+            base += self._known(line.conditions)
         name = _name_of(line)
         run = self._running(base, f"line `{line.name}` of table `{table.name}`", name)
         self._actions(run, line.actions)
@@ -379,10 +379,7 @@ class Obligations:
     def _none(self, table: Table) -> Node:
         """Return the condition that no line matches."""
         return values.all_of(
-            values.negation(
-                values.all_of(self._known(test.condition for test in line.tests if test is not None))
-            )
-            for line in table.lines
+            values.negation(values.all_of(self._known(line.conditions))) for line in table.lines
         )
 
     def _actions(self, run: Run, actions: tuple[Action, ...]) -> None:
@@ -469,5 +466,4 @@ def _told_at(span: Span, failure: Failure, stating: Sequence[tuple[Line, int]]) 
 
 
 def _name_of(line: Line | Default) -> Span:
-    """Return the span of the line's name."""
     return line.cell_span(-1) if isinstance(line, Line) else line.span

@@ -147,7 +147,7 @@ class _Comparison:
             for name, change in differences(self.first, self.second, program.kinds, self.shared)
             if change is not values.FALSE
         ]
-        tests = [test.condition for line in lines for test in line.tests if test is not None]
+        tests = [condition for line in lines for condition in line.conditions]
         self._there = [*(tests if where is None else [where]), *_relied(program, table)]
 
     @cached_property

@@ -169,8 +169,7 @@ class Run(Evaluation):
         for name, here in self.chosen(choice).items():
             table, none = tables[name], here
             for line in table.lines:
-                tests = (self.evaluate(test.condition) for test in line.tests if test is not None)
-                match = values.both(here, values.all_of(tests))
+                match = values.both(here, values.all_of(map(self.evaluate, line.conditions)))
                 arms.append((match, [action.statement for action in line.actions]))
                 none = values.both(none, values.negation(match))
             if table.default is not None:

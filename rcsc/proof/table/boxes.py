@@ -32,12 +32,11 @@ def lines_of(table: Table, words: Words | None = None) -> list[dict[str, Box]]:
     lines = []
     for line in table.lines:
         boxes: dict[str, Box] = {}
-        for test in line.tests:
-            if test is not None:
-                if id(test) not in known:
-                    known[id(test)] = _of_test(test, words or {})
-                for name, box in known[id(test)].items():
-                    boxes[name] = meet(boxes[name], box) if name in boxes else box
+        for test in line.stated:
+            if id(test) not in known:
+                known[id(test)] = _of_test(test, words or {})
+            for name, box in known[id(test)].items():
+                boxes[name] = meet(boxes[name], box) if name in boxes else box
         lines.append(boxes)
     return lines
 

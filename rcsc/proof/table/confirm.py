@@ -93,7 +93,7 @@ class TableSolver:
         """Return the term that a line matches."""
         if at not in self._lines:
             self._lines[at] = smt.all_of(
-                [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
+                [self._test(test.condition, id(test)) for test in self.table.lines[at].stated]
             )
         return self._lines[at]
 
@@ -158,7 +158,7 @@ def _steps_of_all(table: Table, options: Options) -> int:
     """Return the budget of all questions that confirm a verdict; 0 where none is to be asked."""
     if options.solver != "auto":
         return sys.maxsize if options.solver == "both" else 0
-    cells = sum(1 for line in table.lines for test in line.tests if test is not None)
+    cells = sum(len(line.stated) for line in table.lines)
     if cells * len(table.lines) <= _SMALL:
         return sys.maxsize
     return 0 if options.brief else max(0, _OF_A_LARGE_TABLE - _OF_A_CELL * cells)

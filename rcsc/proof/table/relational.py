@@ -181,17 +181,11 @@ class _Decision:
         """Yield inputs, then some that lines, and pairs of them, are likely to match: few others match a mask of a word."""
         random = Random(0)  # noqa: S311  # a sample, not a secret
         points = list(trial.points(self.program.variables))
-        nodes = sum(
-            1
-            for line in self.table.lines
-            for test in line.tests
-            if test is not None
-            for _ in parts(test.condition)
-        )
+        nodes = sum(1 for line in self.table.lines for each in line.conditions for _ in parts(each))
         yield from points[: max(_FEWEST_POINTS, trial.EVALUATIONS // max(1, nodes))]
         kinds = self.program.kinds
         aims = {id(test): trial.Aim.of(test) for test in self.table.distinct_tests}
-        tests = [[aims[id(test)] for test in line.tests if test is not None] for line in self.table.lines]
+        tests = [[aims[id(test)] for test in line.stated] for line in self.table.lines]
         for one in tests * _AIMED:
             yield trial.towards(random.choice(points), one, kinds, random)
         for one, other in islice(combinations(tests, 2), _MOST_PAIRS_AIMED):

@@ -52,8 +52,7 @@ def likely(
 def _likely_overlap(
     program: Program, table: Table, overlap: Overlap, facts: Sequence[Expr], options: Options
 ) -> Overlap:
-    tests = (test for at in (overlap.first, overlap.second) for test in table.lines[at].tests)
-    here = [test.condition for test in tests if test is not None]
+    here = [*table.lines[overlap.first].conditions, *table.lines[overlap.second].conditions]
     shown = [v for v in program.variables if v.name in overlap.witness]
     witness = least_where([*here, *facts], program.variables, shown, options)
     if witness is None or not _inside(program, overlap.region, witness):
@@ -63,11 +62,7 @@ def _likely_overlap(
 
 def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr], options: Options) -> Gap:
     """Return the gap with an input that the facts allow, and the region of that input first."""
-    here = [
-        negation(conjunction(test.condition for test in line.tests if test is not None))
-        for line in table.lines
-        if any(line.tests)
-    ]
+    here = [negation(conjunction(line.conditions)) for line in table.lines if line.conditions]
     shown = [v for v in program.variables if v.name in gap.witnesses[0]]
     witness = least_where([*here, *facts], program.variables, shown, options)
     if witness is None:

@@ -331,12 +331,11 @@ def lines_of(universe: Universe, table: Table) -> list[Clauses]:
     lines = []
     for line in table.lines:
         parts: list[Formula] = []
-        for test in line.tests:
-            if test is not None:
-                of_test = known.get(id(test))
-                if of_test is None:
-                    of_test = known[id(test)] = list(universe.parts_of_test(test))
-                parts += of_test
+        for test in line.stated:
+            of_test = known.get(id(test))
+            if of_test is None:
+                of_test = known[id(test)] = list(universe.parts_of_test(test))
+            parts += of_test
         lines.append(clauses(parts))
     return lines
 
