@@ -207,6 +207,11 @@ def closure(called: Iterable[str], procedures: Mapping[str, Procedure]) -> set[s
     return seen
 
 
+def root_of(leaf: str) -> str:
+    """Return the variable that a leaf is a part of."""
+    return leaf.partition(".")[0].partition("[")[0]
+
+
 def is_part(leaf: str, whole: str) -> bool:
     """Return whether the leaf is the variable, or a field or element of it."""
     return leaf == whole or leaf.startswith((f"{whole}.", f"{whole}["))
@@ -280,9 +285,8 @@ class Uses:
 
     def _line(self, table: Table, line: Line | Default) -> None:
         name, answers = f"table {table.name}", line.requirements or table.requirements
-        for test in line.tests if isinstance(line, Line) else ():
-            if test is not None:
-                self._reads(name, line.name, test.condition, answers)
+        for condition in line.conditions if isinstance(line, Line) else ():
+            self._reads(name, line.name, condition, answers)
         self._body(name, line.name, [action.statement for action in line.actions], answers)
 
     def _body(self, name: str, line: str, body: Iterable[Statement], answers: Sequence[str]) -> None:

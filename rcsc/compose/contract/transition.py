@@ -36,7 +36,7 @@ from rcsc.lang.model import (  # fmt: skip
 )
 from rcsc.lang.protocol.environment import EARLY as EARLY  # noqa: PLC0414  # of a cycle as nodes, too
 from rcsc.lang.protocol.environment import refusable, unadmitted
-from rcsc.lang.restart import After, Fixed, SameAs, Stands
+from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.evaluation import ExternResults, State
 from rcsc.proof.symbolic.execution import Run
@@ -49,8 +49,6 @@ REFUSED = f"{GHOST}and an input was refused"
 _REFUSED = "an input is refused:"
 """Of a cycle: whether the environment ends it by an input. Its variables are no leaves: a leaf has no colon."""
 Leaves = dict[str, Node]
-NUMBERS = 65536
-"""How many command numbers there are (16 bits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +96,7 @@ class TableAt:
 
     def several(self) -> Node:
         """Return the condition that at least two lines match."""
-        twice, before = FALSE, FALSE
-        for match in self.matches:
-            twice = values.either(twice, values.both(before, match))
-            before = values.either(before, match)
-        return twice
+        return values.several(self.matches)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +162,7 @@ class Cycle:
 
 
 def _matches(run: Run, line: Line) -> Node:
-    return values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
+    return values.all_of(map(run.evaluate, line.conditions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,7 +360,7 @@ class TransitionSystem:
         Raises:
             StopIteration: It has none of this name.
         """
-        return next(table for table in self.program.tables if table.name == name)
+        return self.program.table(name)
 
     def table_of(self, snapshot: Snapshot) -> str:
         """Return the table that ran last, from the leaves after its cycle; its selector is steady (`UNSTEADY_SELECTOR`)."""
@@ -598,4 +592,5 @@ def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tu
 def successor(number: Node) -> Node:
     """Return the next number of 16 bits."""
     step, modulus = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
-    return values.remainder(values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus, number.kind)
+    following = values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS))
+    return values.arithmetic(Op.MOD, (following, modulus), number.kind)

@@ -10,9 +10,10 @@ from random import Random
 
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.given import at_random
-from rcsc.compose.contract.transition import EARLY, GHOST, NUMBERS, TransitionSystem
+from rcsc.compose.contract.transition import EARLY, GHOST, TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, Fault, cycle, initial
 from rcsc.lang.model import Enum, Value, key_bounds, value_of_key
+from rcsc.lang.restart import NUMBERS
 
 
 @dataclass(slots=True)

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
-from rcsc.compose.contract.transition import NUMBERS, Cycle, TransitionSystem
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, as_declared, ran_on
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
+from rcsc.lang.restart import NUMBERS
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node

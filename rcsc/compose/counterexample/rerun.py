@@ -20,6 +20,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.counterexample.finding import Finding, rows
 from rcsc.lang.interpret import Fault
+from rcsc.lang.leaves import root_of
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program, spell
 from rcsc.lang.project import project_root
@@ -212,7 +213,7 @@ def _owner(end: str) -> str:
 def _inputs(program: Program) -> tuple[str, ...]:
     """List the input variables, records and arrays whole, in declared order."""
     names = (str(v.name) for v in program.variables if v.kind is VariableKind.INPUT)
-    return tuple(dict.fromkeys(name.partition(".")[0].partition("[")[0] for name in names))
+    return tuple(dict.fromkeys(map(root_of, names)))
 
 
 def _begun(finding: Finding, system: Description, kind: Kind) -> System:

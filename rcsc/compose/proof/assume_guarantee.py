@@ -30,10 +30,11 @@ from rcsc.compose.contract.claims import (
     worst,
 )
 from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_table
-from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.termination import Ending
-from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER
+from rcsc.lang.leaves import root_of
+from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, NUMBERS
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.execution import Run
 
@@ -108,7 +109,7 @@ def _said(ts: TransitionSystem, inputs: Iterable[str], ends: str) -> str:
     """Spell an assumption about inputs; a record or an array with several of them is named once. Return "" for none."""
     parts: dict[str, list[str]] = {}
     for leaf in inputs:
-        parts.setdefault(leaf.partition(".")[0].partition("[")[0], []).append(leaf)
+        parts.setdefault(root_of(leaf), []).append(leaf)
     names = [f"`{leaves[0] if len(leaves) == 1 else whole}`" for whole, leaves in parts.items()]
     verb = "is" if len(names) == 1 else "are"
     return f"{', '.join(names)} of level `{ts.level.name}` {verb} {ends}" if names else ""

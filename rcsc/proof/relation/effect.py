@@ -178,9 +178,7 @@ class Meaning:
     def lines(self, table: Table) -> list[Node]:
         """Return where each line matches, looking at no other; each test is asked once."""
         known = {id(test): self.condition(test.condition) for test in table.distinct_tests}
-        return [
-            values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
-        ]
+        return [values.all_of(known[id(test)] for test in line.stated) for line in table.lines]
 
     def every_line(self, table: Table) -> list[Node]:
         """Return where each line matches, looking at no other, and where DEFAULT does if the table has one."""
@@ -289,12 +287,3 @@ def differences(
         same = shared.equal(value_after(left, name, shared), value_after(right, name, shared))
         if same is not values.TRUE:
             yield name, values.both(good, values.negation(same))
-
-
-def several(nodes: Iterable[Node]) -> Node:
-    """Return where at least two hold."""
-    before, twice = FALSE, FALSE
-    for node in nodes:
-        twice = values.either(twice, values.both(before, node))
-        before = values.either(before, node)
-    return twice

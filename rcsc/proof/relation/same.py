@@ -14,7 +14,7 @@ from typing import TypeAlias
 from rcsc.lang.hidden import hidden, matched
 from rcsc.lang.meaning import relying
 from rcsc.lang.model import Action, Program, Table, Value, Variable, VariableName
-from rcsc.proof.relation.effect import Effect, Meaning, Shared, differences, several
+from rcsc.proof.relation.effect import Effect, Meaning, Shared, differences
 from rcsc.proof.relation.questions import stated
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
@@ -93,7 +93,7 @@ def outcomes(
         joined: How conditions are conjoined: what lines say stands first, then what makes one of them the only one.
     """
     lines = meaning.lines(table)
-    undefined, many = values.any_of(meaning.bad), several(lines)
+    undefined, many = values.any_of(meaning.bad), values.several(lines)
     fine, default = values.negation(undefined), table.default
     for line, holds in zip(table.lines, lines, strict=True):
         alone = joined((holds, values.negation(many), fine))

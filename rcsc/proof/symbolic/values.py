@@ -174,6 +174,15 @@ def any_of(nodes: Iterable[Node]) -> Node:
     return negation(all_of(negation(node) for node in nodes))
 
 
+def several(nodes: Iterable[Node]) -> Node:
+    """At least two."""
+    before, twice = FALSE, FALSE
+    for node in nodes:
+        twice = either(twice, both(before, node))
+        before = either(before, node)
+    return twice
+
+
 # --- values ----------------------------------------------------------------------------
 
 
@@ -259,11 +268,6 @@ def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | 
     bounds = intervals.apply(op, kinds, ())
     assert isinstance(bounds, Int | Real)
     return bounds.low, bounds.high
-
-
-def remainder(value: Node, divisor: Node, kind: Scalar) -> Node:
-    """Return the remainder of a division of integers; `kind` is that of the result."""
-    return arithmetic(Op.MOD, (value, divisor), kind)
 
 
 def wraps_once(node: Node) -> bool:

@@ -15,8 +15,7 @@ from dataclasses import fields, is_dataclass
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Span
-from rcsc.lang.expressions.scope import root_of
-from rcsc.lang.leaves import every_statement, expressions, read_by, written_by
+from rcsc.lang.leaves import every_statement, expressions, read_by, root_of, written_by
 from rcsc.lang.model import (
     BEFORE,
     Array,
