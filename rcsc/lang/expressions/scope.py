@@ -232,11 +232,6 @@ _SERVING = frozenset({"new_command", "answered", SEEN})
 """State that a level keeps about its superior's order."""
 
 
-def root_of(leaf: str) -> str:
-    """Return the variable that a leaf is a part of."""
-    return leaf.partition(".")[0].partition("[")[0]
-
-
 def spell_number(value: Value) -> str:
     """Return the number for a message; a very long one by its size."""
     if isinstance(value, int) and abs(value) >= 10**40:

@@ -16,8 +16,8 @@ Trusted: all of it, for what a program is; nothing later looks at the text again
 array's elements count.
 
 Modules, in the order the data flows: `program` takes the files of a root through the others: `declarations` (units,
-enumerations, constants), `variables`, `statements`, `procedures`, `tables` (with `precedence`, where lines go before others, and
-`sequence`, in which their cells run), `levels` (with the order of their tables), `owners`, `properties`, `roles`.
+enumerations, constants, variables), `statements`, `procedures` and owners, `tables` (with `precedence`, where lines go before others),
+`levels` (with the order of their tables), `roles`; it has assumptions, invariants and properties itself.
 """
 
 from rcsc.lang.resolve.program import closure, compile_text, resolve

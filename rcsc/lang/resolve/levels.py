@@ -57,9 +57,8 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.lang.resolve.owners import Owners
-from rcsc.lang.resolve.procedures import touched
-from rcsc.lang.resolve.variables import fits
+from rcsc.lang.resolve.declarations import fits
+from rcsc.lang.resolve.procedures import Owners, touched
 from rcsc.lang.syntax import tree
 
 USUAL_PERIOD = 40

@@ -32,7 +32,7 @@ from rcsc.lang.model import (
     unit_text,
 )
 from rcsc.lang.protocol import Flags, Parties, Party, Watched, condition, in_step
-from rcsc.lang.resolve.variables import value_given
+from rcsc.lang.resolve.declarations import value_given
 from rcsc.lang.restart import (
     COMMAND,
     ECHOES,

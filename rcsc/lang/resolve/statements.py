@@ -6,10 +6,10 @@ from typing import assert_never
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.operators import Typed, common_unit, conversion, kind_word, same_kind, side
-from rcsc.lang.expressions.scope import Body, Scope, root_of, spell_number
+from rcsc.lang.expressions.scope import Body, Scope, spell_number
 from rcsc.lang.expressions.typed import Path, boolean, path_of, typed
 from rcsc.lang.expressions.types import constant, scalar_of
-from rcsc.lang.leaves import is_part, read_by
+from rcsc.lang.leaves import is_part, read_by, root_of
 from rcsc.lang.model import (
     Arm,
     Assign,
@@ -37,7 +37,7 @@ from rcsc.lang.model import (
     VariableName,
     pending,
 )
-from rcsc.lang.resolve.variables import fits, scalars
+from rcsc.lang.resolve.declarations import fits, scalars
 from rcsc.lang.restart import COMMAND, NUMBER
 from rcsc.lang.syntax import tree
 

@@ -30,7 +30,7 @@ from rcsc.lang.model import (
 from rcsc.lang.operator_table import single
 from rcsc.lang.project import Loaded, project_root, starts_at_zero
 from rcsc.lang.resolve import closure, resolve
-from rcsc.lang.resolve.variables import element
+from rcsc.lang.resolve.declarations import element
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
