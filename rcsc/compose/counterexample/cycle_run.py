@@ -168,7 +168,6 @@ def _failed(ts: TransitionSystem, table: Table, now: Snapshot) -> tuple[str, ...
 
 
 def _actions(table: Table, name: str) -> list[Statement]:
-    """Return the actions of a line."""
     return [action.statement for line in table.every_line if line.name == name for action in line.actions]
 
 

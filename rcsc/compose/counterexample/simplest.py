@@ -129,7 +129,6 @@ class Simplest:
         return can
 
     def _least(self, node: Node) -> Value:
-        """Return the least value that the node can have."""
         can = self.run.holds(self.given)
         assert can
 

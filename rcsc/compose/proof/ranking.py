@@ -477,7 +477,6 @@ class _Guesses:
 
 
 def _sum_of(products: Sequence[tuple[Term, Term]]) -> Term:
-    """Return the sum of the products."""
     terms = [smt.integer_operation("*", left, right) for left, right in products]
     return reduce(lambda total, term: smt.integer_operation("+", total, term), terms)
 

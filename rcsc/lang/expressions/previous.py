@@ -230,7 +230,6 @@ def _keeper(leaf: Variable, name: VariableName, doc: str) -> Variable:
 
 
 def _type_at(scope: Scope, path: str) -> Type:
-    """Return the type of a variable, or of a field of it."""
     root, *fields = path.split(".")
     kind = scope.declared[root].type
     for field in fields:

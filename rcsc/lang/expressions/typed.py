@@ -337,7 +337,6 @@ def _is_value(scope: Scope, body: Body, written: tree.Expr) -> bool:
 
 
 def _bits_of(scope: Scope, body: Body, written: tree.BitsOf) -> Typed | None:
-    """Resolve `word[3..0]`."""
     word = typed(scope, body, written.base)
     ends = _place(scope, body, written.high), _place(scope, body, written.low)
     return None if word is None else words.field(scope, word, ends, written.span)

@@ -285,7 +285,6 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
 
 
 def _computed(term: Term, args: Sequence[Any], wide: bool) -> Any:
-    """Compute one operation in every case."""
     first, last = args[0], args[-1]
     match term.op:
         case "kept":

@@ -36,7 +36,8 @@ def check_shape(certificate: Any, program: str) -> None:
     if certificate["program"] != program:
         raise RejectedError("it is of a program of another name")
     _owe(
-        _text(certificate["meaning"]) and _list_of(certificate["tables"], _is_table),
+        _text(certificate["meaning"])
+        and _list_of(certificate["tables"], lambda entry: isinstance(entry, dict)),
         "it",
         "meaning or tables",
     )
@@ -44,12 +45,7 @@ def check_shape(certificate: Any, program: str) -> None:
         _entry(entry)
 
 
-def _is_table(entry: Any) -> bool:
-    return isinstance(entry, dict)
-
-
 def _entry(entry: Mapping[str, Any]) -> None:
-    """Check the entry of one table."""
     where = f"table `{str(entry.get('table'))[:60]}`"
     _fields(entry, _TABLE, frozenset({WITNESS}), where)
     for key in ("assumptions", "columns"):

@@ -307,7 +307,6 @@ def any_of(terms: Sequence[Term]) -> Term:
 
 
 def _whole(term: Term) -> Any:
-    """Return a whole number as an integer."""
     z3: Any = _z3()
     return z3.BV2Int(term) if z3.is_bv(term) else term
 

@@ -95,7 +95,6 @@ class Bits:
         return conjunction
 
     def _same(self, a: Literal, b: Literal) -> Literal:
-        """State that they are equal."""
         if a in (TRUE, FALSE) or b in (TRUE, FALSE):
             known, other = (a, b) if a in (TRUE, FALSE) else (b, a)
             return other if known == TRUE else -other
@@ -136,7 +135,6 @@ class Bits:
         return self.all_of(self._same(x, y) for x, y in _aligned(a, b))
 
     def _below(self, a: Word, b: Word) -> Literal:
-        """State that the first is less."""
         pairs = list(_aligned(a, b))
         less = FALSE
         for x, y in pairs[:-1]:

@@ -225,7 +225,6 @@ def least_witness(
 
 
 def _model(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, int]:
-    """Return the keys of the last model."""
     return {v.name: key_of(v.type, solver.value(frame.leaves[v.name], v.type)) for v in variables}
 
 

@@ -257,7 +257,6 @@ def _all_hold(order: Sequence[Node], conditions: Sequence[Node], point: Mapping[
 
 
 def _known(order: Sequence[Node], point: Mapping[str, Value]) -> dict[Node, Value | None]:
-    """Return the value of each node."""
     known: dict[Node, Value | None] = {}
     for node in order:
         known[node] = _value(node, [known[part] for part in node.args], point)

@@ -251,7 +251,6 @@ def _meet(left: Mapping[str, Box], right: Mapping[str, Box]) -> bool:
 
 
 def _classes(starts: list[int], last: int) -> list[tuple[int, int]]:
-    """Return the classes that begin at the starts."""
     return [(low, high - 1) for low, high in pairwise([*starts, last + 1])]
 
 

@@ -71,7 +71,6 @@ class Ends:
 
 
 def _cuts(form: int, begins: Mapping[int, int], ends: Mapping[int, int]) -> list[Cut]:
-    """Return the cuts of one form, in order."""
     places = sorted({*begins, *ends})
     below, above = list[int](), list[int]()
     under = over = 0

@@ -181,7 +181,6 @@ def _mask(condition: Expr) -> Mask | None:
 
 
 def _fields(condition: Expr) -> Iterator[Field]:
-    """Yield every field that the condition looks at."""
     part = field_of(condition)
     if part is not None:
         yield part
