@@ -122,7 +122,8 @@ class Text:
             return made.after(Outcome.FAILS)
         counted = not made.wrong.gap or None not in (made.wrong.left, made.before.left)
         if cell.falls or made.wrong.within(made.before):
-            same = made.names == _names(self.table) and made.tests[other] == _tests(self.table)[other]
+            own = _tests(self.table)
+            same = list(made.tests) == list(own) and made.tests[other] == own[other]
             return made.after(Outcome.HOLDS if same and (cell.falls or counted) else Outcome.OPEN)
         return made.after(Outcome.FAILS)
 
@@ -141,7 +142,8 @@ class Text:
         made = self._made((Change(ChangeKind.LINE, texts=row.cells),))
         if not isinstance(made, _Made):
             return After(made)
-        new = [name for name in made.names if name not in _names(self.table)]
+        own = _tests(self.table)
+        new = [name for name in made.tests if name not in own]
         others = {name: tests for name, tests in made.tests.items() if name not in new}
         try:
             matches = matching_lines(made.table, seen)
@@ -149,7 +151,7 @@ class Text:
             return made.after(Outcome.OPEN)
         overlaps = any(name in pair for name in new for pair in made.wrong.pairs)
         closes = not (row.closes and made.wrong.gap)
-        right = len(new) == 1 and matches == new and not overlaps and closes and others == _tests(self.table)
+        right = len(new) == 1 and matches == new and not overlaps and closes and others == own
         return made.after(Outcome.HOLDS if right else Outcome.FAILS)
 
     def under(self, condition: str) -> Outcome:
@@ -235,27 +237,18 @@ class _Made:
     wrong: Wrong
 
     @property
-    def names(self) -> list[str]:
-        """The names of the lines, in order."""
-        return _names(self.table)
-
-    @property
     def tests(self) -> Mapping[str, object]:
-        """The conditions of each line, by its name."""
+        """The conditions of each line, by its name, in order."""
         return _tests(self.table)
 
     def after(self, outcome: Outcome) -> After:
         """Return the result with this outcome."""
-        order = self.names
+        order = list(self.tests)
         pairs = sorted(tuple(sorted(pair, key=order.index)) for pair in self.wrong.pairs)
         return After(outcome, self.ts, tuple((first, second) for first, second in pairs))
 
 
 _QUICK = Options(brief=True, bare=True, jobs=1)
-
-
-def _names(table: Table) -> list[str]:
-    return [str(line.name) for line in table.lines]
 
 
 def _tests(table: Table) -> Mapping[str, object]:

@@ -598,25 +598,17 @@ class _Decision:
 
         Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
         """
-        try:
-            return self._around(point, wrong)
-        except _OverError:
-            return None
-
-    def _around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
-        """Return the box that `around` returns.
-
-        Raises:
-            _OverError: It is given up.
-        """
         unwanted = [every(formulas) for formulas in wrong]
 
         def holds(box: Mapping[int, Bounds]) -> bool:
             return all(self.excluded(box, formula) for formula in unwanted)
 
-        box = widest(self.universe, point, self.columns, holds)
-        if self.assumed:
-            box = self._possible(box, point)
+        try:
+            box = widest(self.universe, point, self.columns, holds)
+            if self.assumed:
+                box = self._possible(box, point)
+        except _OverError:
+            return None
         return {
             v.name: (bounds,)
             for v, column in zip(self.variables, self.columns, strict=True)
