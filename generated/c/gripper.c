@@ -240,6 +240,12 @@ static void gripper_admit(gripper_t *s)
     }
 }
 
+/* After a fault: outputs that have a safe value show it. */
+static void gripper_safe(gripper_t *s)
+{
+    s->to_hand.drive = false;
+}
+
 /* Finds the line of table position: its position; -1 none, -2 several. */
 static RCSC_INLINE int32_t gripper_match_position(const gripper_t *s)
 {
@@ -634,21 +640,39 @@ void gripper_pause_gripper_lines(const gripper_t *in, int32_t *out, uint32_t n)
 int32_t gripper_position_step(gripper_t *s)
 {
     gripper_admit(s);
-    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_position(s) : s->fault;
+    if (s->fault == GRIPPER_FAULT_NONE) {
+        (void)gripper_run_position(s);
+    }
+    if (s->fault != GRIPPER_FAULT_NONE) {
+        gripper_safe(s);
+    }
+    return s->fault;
 }
 
 /* One step of table grasp: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t gripper_grasp_step(gripper_t *s)
 {
     gripper_admit(s);
-    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_grasp(s) : s->fault;
+    if (s->fault == GRIPPER_FAULT_NONE) {
+        (void)gripper_run_grasp(s);
+    }
+    if (s->fault != GRIPPER_FAULT_NONE) {
+        gripper_safe(s);
+    }
+    return s->fault;
 }
 
 /* One step of table pause_gripper: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t gripper_pause_gripper_step(gripper_t *s)
 {
     gripper_admit(s);
-    return (s->fault == GRIPPER_FAULT_NONE) ? gripper_run_pause_gripper(s) : s->fault;
+    if (s->fault == GRIPPER_FAULT_NONE) {
+        (void)gripper_run_pause_gripper(s);
+    }
+    if (s->fault != GRIPPER_FAULT_NONE) {
+        gripper_safe(s);
+    }
+    return s->fault;
 }
 
 /* One cycle of level gripper, every 40 ms: returns the fault, 0 for none. */
@@ -672,6 +696,9 @@ int32_t gripper_gripper_cycle(gripper_t *s)
             gripper_do_show_opening(s);
             gripper_do_give_orders(s);
         }
+    }
+    if (s->fault != GRIPPER_FAULT_NONE) {
+        gripper_safe(s);
     }
     return s->fault;
 }

@@ -89,9 +89,9 @@ enum {
     GRIPPER_FAULT_ARITHMETIC = 7 /* this machine, or its compiler, computes reals otherwise */
 };
 
-/* Digests of what the tables mean, f7ef2a81fa40ff69, and of how the state is laid out, 796ad2d866a867d5:
+/* Digests of what the tables mean, 3a59817c456f303c, and of how the state is laid out, 796ad2d866a867d5:
    comments, and names of files, change neither. The number is made of both. */
-#define GRIPPER_DIGEST 0x481cae5fu
+#define GRIPPER_DIGEST 0xedddc538u
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. Numbers are
    positions of variables.
@@ -120,7 +120,7 @@ typedef struct {
     bool forced; /* 18: state */
     bool closing; /* 19: state */
     uint8_t waited; /* 20: state; 0 .. 150 */
-    gripper_hand_order_t to_hand; /* 21 to 24: output; To the hand. */
+    gripper_hand_order_t to_hand; /* 21 to 24: output; safe false; To the hand. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: why the last cycle ended early; 0 for nothing */
     /* trace: position of the variable that was refused, or of the assumption; -1 for none */

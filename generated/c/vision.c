@@ -274,6 +274,12 @@ static void vision_admit(vision_t *s)
     }
 }
 
+/* After a fault: outputs that have a safe value show it. */
+static void vision_safe(vision_t *s)
+{
+    s->to_camera.fire = VISION_FLASH_DARK;
+}
+
 /* Finds the line of table flood_flash: its position; -1 none, -2 several. */
 static RCSC_INLINE int32_t vision_match_flood_flash(const vision_t *s)
 {
@@ -714,21 +720,39 @@ void vision_pause_vision_lines(const vision_t *in, int32_t *out, uint32_t n)
 int32_t vision_flood_flash_step(vision_t *s)
 {
     vision_admit(s);
-    return (s->fault == VISION_FAULT_NONE) ? vision_run_flood_flash(s) : s->fault;
+    if (s->fault == VISION_FAULT_NONE) {
+        (void)vision_run_flood_flash(s);
+    }
+    if (s->fault != VISION_FAULT_NONE) {
+        vision_safe(s);
+    }
+    return s->fault;
 }
 
 /* One step of table line_flash: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t vision_line_flash_step(vision_t *s)
 {
     vision_admit(s);
-    return (s->fault == VISION_FAULT_NONE) ? vision_run_line_flash(s) : s->fault;
+    if (s->fault == VISION_FAULT_NONE) {
+        (void)vision_run_line_flash(s);
+    }
+    if (s->fault != VISION_FAULT_NONE) {
+        vision_safe(s);
+    }
+    return s->fault;
 }
 
 /* One step of table pause_vision: admits, settles, matches, acts; returns the fault, 0 for none. */
 int32_t vision_pause_vision_step(vision_t *s)
 {
     vision_admit(s);
-    return (s->fault == VISION_FAULT_NONE) ? vision_run_pause_vision(s) : s->fault;
+    if (s->fault == VISION_FAULT_NONE) {
+        (void)vision_run_pause_vision(s);
+    }
+    if (s->fault != VISION_FAULT_NONE) {
+        vision_safe(s);
+    }
+    return s->fault;
 }
 
 /* One cycle of level vision, every 40 ms: returns the fault, 0 for none. */
@@ -751,6 +775,9 @@ int32_t vision_vision_cycle(vision_t *s)
         if (s->fault == VISION_FAULT_NONE) {
             vision_do_give_orders(s);
         }
+    }
+    if (s->fault != VISION_FAULT_NONE) {
+        vision_safe(s);
     }
     return s->fault;
 }

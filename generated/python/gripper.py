@@ -113,7 +113,7 @@ class gripper_state(IntEnum):
     moving = 2
 
 
-DIGEST = 0x481cae5f
+DIGEST = 0xedddc538
 """Which tables a state is of: what they mean, and how the state is laid out; as in C."""
 FOREIGN = 25
 """What `check` gives of a state that other tables made."""
@@ -428,6 +428,11 @@ def _settle(s):
     pass
 
 
+def _safe(s):
+    """After a fault: outputs that have a safe value show it."""
+    s.to_hand_drive = False
+
+
 def position_line(s):
     """The line of table position that matches admitted inputs: its position; -1 none, -2 several."""
     if s.cur_state >= 2:
@@ -542,6 +547,8 @@ def position_step(s):
             _run_position(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
+    if s.fault != 0:
+        _safe(s)
     return s.fault
 
 
@@ -633,6 +640,8 @@ def grasp_step(s):
             _run_grasp(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
+    if s.fault != 0:
+        _safe(s)
     return s.fault
 
 
@@ -672,6 +681,8 @@ def pause_gripper_step(s):
             _run_pause_gripper(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
+    if s.fault != 0:
+        _safe(s)
     return s.fault
 
 
@@ -689,6 +700,8 @@ def gripper_cycle(s):
                 _do_give_orders(s)
         except _Refused as refused:
             s.fault, s.fault_at = 4, refused.position
+    if s.fault != 0:
+        _safe(s)
     return s.fault
 
 

@@ -23,7 +23,7 @@ _WORD = re.compile(r"\w+")
 def check(settings: Settings) -> Report:
     """Prove every table; for those that a system's levels run, tell what the proof of the levels together shows."""
     cache = _cache(settings)
-    report = _unread_elsewhere(_checked(settings, cache))
+    report = _staying_outside(_unread_elsewhere(_checked(settings, cache)))
     if cache is None or not any(systems_above(table.file) for table in report.tables):
         return report
     from rcsc.driver.together import with_levels  # keep lazy: most files belong to no system
@@ -61,6 +61,30 @@ def _unread_elsewhere(report: Report) -> Report:
         )
 
     return replace(report, diagnostics=tuple(filter(kept, report.diagnostics))) if told else report
+
+
+def _staying_outside(report: Report) -> Report:
+    """Return the report without warnings of outputs after a fault that no system leads to somebody outside its levels."""
+
+    def kept(each: Diagnostic) -> bool:
+        span = each.primary.span
+        return each.code is not Code.STAYS_AFTER_FAULT or report.sources[span.file].slice(span) in {
+            name for system in systems_above(span.file) for name in _outside(system)
+        }
+
+    return replace(report, diagnostics=tuple(filter(kept, report.diagnostics)))
+
+
+def _outside(system: Path) -> Iterator[str]:
+    """Yield the outputs that a system leads to somebody outside its levels; none where it is not in order."""
+    from rcsc.run.description import BadDescription, description  # keep lazy: few files have such a warning
+
+    with suppress(BadDescription):
+        said = description(system)
+        levels = {level.name for level in said.levels}
+        for wire in said.wires:
+            if wire.target.partition(".")[0] not in levels:
+                yield wire.source.partition(".")[2]
 
 
 def _descriptions(file: str) -> Iterator[Path]:

@@ -103,12 +103,18 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class RecordField:
-    """A named part of a record; `initial` is what it, or each element of it, starts with where that is written."""
+    """A named part of a record.
+
+    Attributes:
+        initial: The value that it, or each element of it, starts with where that is written.
+        safe: The value that it shows in an output after a fault, where that is written.
+    """
 
     name: str
     type: "Type"
     doc: str = ""
     initial: Value | None = field(default=None, compare=False)
+    safe: Value | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

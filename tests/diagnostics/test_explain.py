@@ -13,7 +13,7 @@ NOTES = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 
-UNREAD = {Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER}
+UNREAD = {Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER, Code.STAYS_AFTER_FAULT}
 """What `rcsc check` asks of a whole file, which the examples of other codes are not."""
 
 

@@ -126,6 +126,64 @@ def test_what_another_file_or_the_system_may_read_is_not_told(tmp_path: Path) ->
     assert "nothing reads" not in check()
 
 
+READINGS = """record order {{ inc_command : int 0 .. 65535  go : bool }}
+record motor {{ on : bool{on}  note : bool }}
+input order : order
+{reading}
+output to_motor : motor
+output shown : bool
+output told : order
+table t {{
+  | line | order.go || to_motor.on | shown | told.go |
+  | on   | true     || true        | true  | true    |
+  | off  | false    || false       | false | true    |
+}}
+level l {{ period 40 [ms] table t }}
+"""
+DRIVES = """name = "robot"
+generated = "generated"
+tick_ms = 40
+outside = ["driver"]
+[[level]]
+name = "l"
+[buffers]
+"l.to_motor" = "driver.order"
+"""
+STAYS = "output `to_motor` stays as it was while a reading of `force_n` is refused"
+
+
+@pytest.mark.parametrize(
+    ("reading", "on", "system", "stays"),
+    [
+        ("input force_n : real 0.0 .. 9.0", "", DRIVES, True),
+        ("input force_n : real 0.0 .. 9.0 clamp", "", DRIVES, True),
+        ("input force_n : int 0 .. 9 reject", "", DRIVES, True),
+        ("input force_n : int 0 .. 9 clamp", "", DRIVES, False),
+        ("input force_n : bool", "", DRIVES, False),
+        ("", "", DRIVES, False),
+        ("input force_n : real 0.0 .. 9.0", " safe false", DRIVES, False),
+        ("input force_n : real 0.0 .. 9.0", "", DRIVES.replace("l.to_motor", "l.told"), False),
+        ("input force_n : real 0.0 .. 9.0", "", "", False),
+        ("input force_n : real 0.0 .. 9.0", "", "name = 3", False),
+    ],
+)
+def test_an_output_to_a_motor_is_told_that_stays_while_a_reading_is_refused(
+    reading: str, on: str, system: str, *, stays: bool, tmp_path: Path
+) -> None:
+    """Not what is shown to nobody, not an order, which has a number, and not where nothing can be refused."""
+    (tmp_path / "rcsc.toml").write_text("", encoding="utf-8")
+    if system:
+        (tmp_path / "system.toml").write_text(system, encoding="utf-8")
+    level = tmp_path / "l.rcs"
+    level.write_text(READINGS.format(reading=reading, on=on), encoding="utf-8")
+    for _ in range(2):  # the second time from the cache
+        output = CliRunner().invoke(commands, ["check", str(level)]).output
+        assert "error" not in output.replace("0 errors", "")
+        assert [line.partition("]: ")[2] for line in output.splitlines() if "RCS322" in line] == [
+            STAYS
+        ] * stays
+
+
 def test_a_file_without_a_project_is_looked_for_beside_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,20 +24,22 @@ OF_THE_PROOF = {Fault.NO_LINE, Fault.SEVERAL_LINES}
 OF_AN_EXECUTOR = {Fault.STATE, Fault.ARITHMETIC}
 """Faults of a state that no cycle left, and of another machine: nothing that happens to a level."""
 
-TEXT = """input guard : bool
+TEXT = """record hand { turns : bool safe true  at : int 0 .. 9 }
+input guard : bool
 input x : int 0 .. 9
 input wide : int 0 .. 90 clamp
 output shown : int 0 .. 9 safe 7
 output bare : int 0 .. 9
+output hand : hand
 state kept : int 0 .. 9
 state late : int 0 .. 9 deferred until x > 3
 output got : int 0 .. 9
 extern procedure ask writes got python "outside:ask" c "ask"
 procedure begin { kept := 1; bare := 2; next late := 5 }
 table t {
-  | line | when || procedures  | shown | bare |
-  |------|------||-------------|-------|------|
-  | all  | true || ask         | 3     | 4    |
+  | line | when || procedures  | shown | bare | hand.turns |
+  |------|------||-------------|-------|------|------------|
+  | all  | true || ask         | 3     | 4    | false      |
 }
 level solo { period 40 [ms] preprocess begin table t }
 """
@@ -79,7 +81,14 @@ def left_by(
     inputs = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT)
     ts = TransitionSystem(program, level, Links(level.name, None, (), (), inputs))
     x, answer = OUTSIDE[event]
-    before: dict[str, Value] = {**initial(program), "late.next": 8, "shown": 2, "bare": 1, "got": 2}
+    before: dict[str, Value] = {
+        **initial(program),
+        "late.next": 8,
+        "shown": 2,
+        "bare": 1,
+        "got": 2,
+        "hand.turns": False,
+    }
     came: dict[str, Value] = {"guard": True, "x": x, "wide": 99}
     with answering(lambda *_: (answer,)):
         outcome = cycle(program, level, {**before, **came})
@@ -90,8 +99,9 @@ def left_by(
 @pytest.mark.parametrize("event", OUTSIDE)
 def test_the_interpreter_leaves_what_is_said(event: Event) -> None:
     _, before, came, after = left_by(event)
-    wrote = {"kept": 1, "late": 8, "late.next": 5, "shown": 3, "bare": 4, "got": 6}
-    so_far = {"kept": 1, "late": 8, "late.next": 5, "bare": 2, "got": 2}
+    wrote = {"kept": 1, "late": 8, "late.next": 5, "shown": 3, "bare": 4, "got": 6, "hand.turns": False}
+    so_far = {"kept": 1, "late": 8, "late.next": 5, "bare": 2, "got": 2, "hand.turns": False}
+    safe = {"shown": 7, "hand.turns": True}
     was = {name: before[name] for name in wrote}
     meant = {
         Kept.TAKEN: {**came, "wide": 90},
@@ -99,15 +109,15 @@ def test_the_interpreter_leaves_what_is_said(event: Event) -> None:
         Kept.AS_BEFORE: was,
         Kept.WRITTEN: wrote,
         Kept.SO_FAR: so_far,
-        Kept.SAFE: so_far | {"shown": 7},
-        Kept.SAFE_OR_BEFORE: was | {"shown": 7},
+        Kept.SAFE: so_far | safe,
+        Kept.SAFE_OR_BEFORE: was | safe,
     }
     left = ENVIRONMENT[event]
     parts = {
         left.inputs: ("guard", "x", "wide"),
         left.state: ("kept", "late"),
         left.pending: ("late.next",),
-        left.outputs: ("shown", "bare", "got"),
+        left.outputs: ("shown", "bare", "got", "hand.turns"),
     }
     assert {name: after[name] for names in parts.values() for name in names} == {
         name: meant[how][name] for how, names in parts.items() for name in names

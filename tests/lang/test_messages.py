@@ -299,6 +299,7 @@ def test_what_is_exchanged_needs_a_local() -> None:
 TEXT = """
 enum light { red, green }
 type offset = real -2.0 .. 5.0
+record tool { on : bool safe true  n : int 0 .. 9 safe 3  m : int 0 .. 9 = 1 safe 5 }
 record pair { a : int -9 .. 9  b : int 3 .. 9 = 4  c : array[2] of int -9 .. 9 = -1  d : offset }
 input seen : int -5 .. 5
 input of_pair : pair
@@ -306,6 +307,8 @@ output speed : int -400 .. 400 safe 7
 output own : int -400 .. 400 = 2 safe 7
 output shown : light safe green
 output lamp : bool safe true
+output tools : array[1] of tool
+input of_tool : tool
 state n : int -9 .. 9 restart 3
 state x : offset
 state s : single -2.5 .. 1.5
@@ -325,6 +328,12 @@ STARTS = {
     "own": 2,
     "shown": 1,
     "lamp": True,
+    "tools[0].on": True,
+    "tools[0].n": 3,
+    "tools[0].m": 1,
+    "of_tool.on": False,
+    "of_tool.n": 0,
+    "of_tool.m": 1,
     "n": 0,
     "x": 0.0,
     "s": 0.0,
@@ -345,7 +354,7 @@ def test_what_starts_with_what() -> None:
     assert isinstance(program, Program), program
     assert {str(name): value for name, value in initial(program).items()} == STARTS
     unset = {str(v.name).partition(".")[0].partition("[")[0] for v in program.variables if not v.given}
-    assert unset == {"seen", "of_pair", "n", "x", "s", "pairs", "later"}
+    assert unset == {"seen", "of_pair", "of_tool", "n", "x", "s", "pairs", "later"}
     meant = {str(v.name) for v in program.variables if v.given}
     assert "pairs[0].b" in meant
     assert "of_pair.b" in meant
@@ -385,6 +394,8 @@ def test_where_nothing_says_it_a_warning_does(text: str, message: str, help_: st
     [
         ("record r { f : int 1 .. 3 = 4 }", Code.OUT_OF_RANGE_CONSTANT),
         ("record r { f : int 1 .. 3 = true }", Code.KIND),
+        ("record r { f : int 1 .. 3 safe 4 }", Code.OUT_OF_RANGE_CONSTANT),
+        ("record r { f : array[2] of bool safe true }", Code.KIND),
         ("record q { f : bool } record r { f : q = true }", Code.KIND),
         ("record q { f : bool } state r : q = true", Code.KIND),
         ("state n : int 0 .. 9 record r { f : int 1 .. 3 = n }", Code.NOT_CONSTANT),

@@ -1003,6 +1003,33 @@ class Code(StrEnum):
           | end   | false | work || rest |
         }
     """
+    STAYS_AFTER_FAULT = """RCS322: an output that stays as it was after a fault
+
+    A cycle that refuses a reading from outside runs no line: time-outs do not count, an order to pause is not taken, and an output
+    without a safe value goes on showing what the cycle before it wrote, for as long as the reading is refused. A warning about outputs that
+    a system's description leads to somebody outside its levels, such as a drive. The value after `safe` is shown instead. A field of
+    a record has its own; where one has one, the others stay on purpose.
+
+        input force_n : real 0.0 .. 500.0 [N]
+        output drive : bool
+        table close {
+          | line | force_n         || drive |
+          | on   | < 40.0 [N]      || true  |
+          | off  | >= 40.0 [N]     || false |
+        }
+        level gripper { period 40 [ms] table close }
+
+    warning: output `drive` stays as it was while a reading of `force_n` is refused
+
+        input force_n : real 0.0 .. 500.0 [N]
+        output drive : bool safe false
+        table close {
+          | line | force_n         || drive |
+          | on   | < 40.0 [N]      || true  |
+          | off  | >= 40.0 [N]     || false |
+        }
+        level gripper { period 40 [ms] table close }
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

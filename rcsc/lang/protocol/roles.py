@@ -337,6 +337,11 @@ def _misplaced(link: tree.LinkDecl, enums: Mapping[str, tuple[str, ...]]) -> Ite
                 )
             if part.restart is not None and parts is link.order:
                 yield "what an order has after a restart is the protocol's", part.name.span
+            if part.safe is not None and (part.word == "reason" or (parts is link.order and not part.word)):
+                yield (
+                    f"`{part.name.text}` keeps to its command's number, so that a fault leaves it as it is",
+                    part.name.span,
+                )
     for more in [part for part in link.report if part.word == "reason"][1:]:
         yield "a report has one reason", more.name.span
 

@@ -171,9 +171,10 @@ def _declare_record(scope: Scope, written: tree.RecordDecl) -> None:
     for part in written.fields:
         kind = type_of(scope, part.type)
         first = value_given(scope, part.initial, element(kind), "initial")
+        safe = value_given(scope, part.safe, kind, "safe")
         if part.name.text in parts:
             scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is a field twice", part.name.span)
-        parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc), first))
+        parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc), first, safe))
     record = Record(written.name.text, tuple(parts.values()), written.name.span.file)
     if size(record) > MOST_LEAVES:
         message = f"a type has at most {MOST_LEAVES} scalar parts"
@@ -237,7 +238,7 @@ def _declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         )
         return
     flat = list(scalars(written.name.text, kind))
-    if max((len(name) for name, _, _ in flat), default=0) > MOST_NAME:
+    if max((len(name) for name, *_ in flat), default=0) > MOST_NAME:
         message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
         scope.report(Code.LONG_NAME, message, written.name.span)
         return
@@ -245,9 +246,10 @@ def _declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
     safe = _safe(scope, written, kind)
     restart = _restart(scope, written, kind)
     deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
-    own = initial if initial is not None or scope.least_first else safe
-    for name, leaf, first in flat:
-        meant = first if own is None else own
+    for name, leaf, first, of_field in flat:
+        shown = None if written.kind != "output" else of_field if safe is None else safe
+        own = first if initial is None else initial
+        meant = own if own is not None or scope.least_first else shown
         begins = value_of_key(leaf, key_bounds(leaf)[0]) if scope.least_first else start(leaf)
         variable = Variable(
             VariableName(name),
@@ -258,7 +260,7 @@ def _declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
             None,
             " ".join(written.doc),
             written.name.span,
-            safe,
+            shown,
             restart,
             given=meant is not None,
         )
@@ -270,7 +272,7 @@ def _declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         written.name.text,
         Kind(written.kind),
         kind,
-        tuple(VariableName(name) for name, _, _ in flat),
+        tuple(VariableName(name) for name, *_ in flat),
         " ".join(written.doc),
         written.name.span,
     )
@@ -286,17 +288,19 @@ def _settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
         scope.leaves[name] = replace(scope.leaves[name], deferred_until=until)
 
 
-def scalars(name: str, kind: Type, first: Value | None = None) -> Iterator[tuple[str, Scalar, Value | None]]:
-    """Yield the scalar parts, each with the initial value from its record."""
+def scalars(
+    name: str, kind: Type, first: Value | None = None, safe: Value | None = None
+) -> Iterator[tuple[str, Scalar, Value | None, Value | None]]:
+    """Yield the scalar parts, each with the initial and the safe value from its record."""
     match kind:
         case Array(length, inner):
             for at in range(length):
-                yield from scalars(f"{name}[{at}]", inner, first)
+                yield from scalars(f"{name}[{at}]", inner, first, safe)
         case Record(fields=fields):
             for part in fields:
-                yield from scalars(f"{name}.{part.name}", part.type, part.initial)
+                yield from scalars(f"{name}.{part.name}", part.type, part.initial, part.safe)
         case _:
-            yield name, kind, first
+            yield name, kind, first, safe
 
 
 def element(kind: Type) -> Type:

@@ -211,7 +211,7 @@ class Statements:
         if origin.type != target.type:
             self.scope.report(Code.KIND, "a record or array is assigned from one of the same type", span)
             return ()
-        suffixes = [(suffix, kind) for suffix, kind, _ in scalars("", target.type)]
+        suffixes = [(suffix, kind) for suffix, kind, *_ in scalars("", target.type)]
         if self._refused(target, origin, len(suffixes), span):
             return ()
         copies: list[Statement] = []

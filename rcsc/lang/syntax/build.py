@@ -1,5 +1,6 @@
 """Parse trees to syntax trees: one method a grammar rule, in grammar order."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -114,10 +115,18 @@ class Build:
 
     def _field(self, node: ParseNode) -> tree.FieldDecl:
         head = self._head(node)
-        name, kind, *begins = node.children
+        name, kind, *values = node.children
+        given = self._values(values)
         return tree.FieldDecl(
-            self._name(name), self.type(kind), self.expr(begins[1]) if begins else None, **head
+            self._name(name), self.type(kind), given.get("EQUAL"), given.get("SAFE"), **head
         )
+
+    def _values(self, written: Sequence[Any]) -> dict[str, tree.Expr]:
+        """Return the values of a field by the words before them."""
+        return {
+            str(getattr(mark, "type", "")): self.expr(value)
+            for mark, value in zip(written[::2], written[1::2], strict=True)
+        }
 
     def _unit_decl(self, node: ParseNode) -> tree.UnitDecl:
         return tree.UnitDecl(self._name(node.children[0]), **self._head(node))
@@ -234,12 +243,15 @@ class Build:
             "",
         )
         name, kind, *values = node.children[bool(word) :]
-        given = {
-            str(getattr(mark, "type", "")): self.expr(value)
-            for mark, value in zip(values[::2], values[1::2], strict=True)
-        }
+        given = self._values(values)
         return tree.LinkField(
-            self._name(name), self.type(kind), given.get("EQUAL"), word, given.get("RESTART"), **head
+            self._name(name),
+            self.type(kind),
+            given.get("EQUAL"),
+            given.get("SAFE"),
+            word,
+            given.get("RESTART"),
+            **head,
         )
 
     def _serves_decl(self, node: ParseNode) -> tree.ServesDecl:

@@ -151,9 +151,10 @@ def _factor(factor: tree.UnitFactor, sign: int) -> str:
 
 
 def spell_field(part: tree.FieldDecl) -> str:
-    """Return a field of a record or a link: its name, its type, and its initial value."""
+    """Return a field of a record or a link: its name, its type, its initial and its safe value."""
     begins = "" if part.initial is None else f" = {spell_expr(part.initial)}"
-    return f"{part.name.text} : {spell_type(part.type)}{begins}"
+    safe = "" if part.safe is None else f" safe {spell_expr(part.safe)}"
+    return f"{part.name.text} : {spell_type(part.type)}{begins}{safe}"
 
 
 def spell_type(kind: tree.TypeExpr) -> str:

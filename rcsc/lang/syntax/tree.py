@@ -578,11 +578,12 @@ class TypeDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class FieldDecl(Documented):
-    """`name : type [= initial]` in a record."""
+    """`name : type [= initial] [safe value]` in a record."""
 
     name: Name
     type: TypeExpr
     initial: Expr | None = None
+    safe: Expr | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -697,7 +698,7 @@ class TableDecl(Required):
 
 @dataclass(frozen=True, slots=True)
 class LinkField(FieldDecl):
-    """`[stream|reason] name : type [= initial] [restart value]` in a link's order or report.
+    """`[stream|reason] name : type [= initial] [safe value] [restart value]` in a link's order or report.
 
     A `stream` changes without a new number, and is looked at as it comes; the `reason` says why a command failed.
     """

@@ -290,7 +290,11 @@ def _names_of_things() -> SearchStrategy[tree.Declaration]:
     """What says a name of a file, a unit, a constant, a type or an owner."""
     some_names = st.lists(NAMES, min_size=1, max_size=3).map(tuple)
     fields = st.lists(
-        st.builds(tree.FieldDecl, NAMES, types(), st.none() | expressions(), **_HEAD), min_size=1, max_size=2
+        st.builds(
+            tree.FieldDecl, NAMES, types(), st.none() | expressions(), st.none() | expressions(), **_HEAD
+        ),
+        min_size=1,
+        max_size=2,
     )
     return st.one_of(
         st.builds(tree.Use, st.sampled_from(["types", "task/vars"]), comments=WORDS),
@@ -367,6 +371,7 @@ def _roles() -> SearchStrategy[tree.Declaration]:
             tree.LinkField,
             NAMES,
             types(),
+            st.none() | expressions(),
             st.none() | expressions(),
             st.sampled_from(["", "stream", "reason"]),
             st.none() | expressions(),

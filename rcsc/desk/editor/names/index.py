@@ -144,7 +144,7 @@ class _Walk:
         for part in fields:
             yield self.name(Space.FIELD, part.name, part)
             yield from self.type(part.type)
-            yield from self.exprs((part.initial,))
+            yield from self.exprs((part.initial, part.safe))
             if isinstance(part, tree.LinkField):
                 yield from self.exprs((part.restart,))
 

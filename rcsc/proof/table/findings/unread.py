@@ -31,10 +31,11 @@ from rcsc.lang.model import (
     Variable,
     spell,
 )
-from rcsc.lang.restart import After, SameAs
+from rcsc.lang.protocol.environment import refusable
+from rcsc.lang.restart import ECHO, NUMBER, After, SameAs
 from rcsc.lang.syntax import tree
 
-TOLD = frozenset({Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER})
+TOLD = frozenset({Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER, Code.STAYS_AFTER_FAULT})
 """The codes of these warnings: `rcsc check` tells them, and no editor, while a text is being written."""
 
 
@@ -47,6 +48,7 @@ def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnos
     """
     if not program.own_tables and not any(level.span.file == program.file for level in program.levels):
         return
+    yield from _staying(program)
     written = [d for file in files.values() for d in file.declarations]
     own = files[program.file].declarations
     yield from _variables(program, {d.name.text for d in own if isinstance(d, tree.VariableDecl)})
@@ -65,6 +67,35 @@ def unread(program: Program, files: Mapping[str, tree.File]) -> Iterator[Diagnos
 
 def _warning(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
     return Diagnostic(code, message, Label(span), help=helps, severity=Severity.WARNING)
+
+
+# --- outputs after a fault ---
+
+
+def _staying(program: Program) -> Iterator[Diagnostic]:
+    """Yield a warning for each output without a safe value, but for orders and reports, of a level that can refuse a reading."""
+    if not any(level.span.file == program.file for level in program.levels):
+        return
+    leaves = {variable.name: variable for variable in program.variables}
+    declared = [one for one in program.declared if not any(map(_numbered, one.leaves))]
+    inputs = (leaves[name] for one in declared if one.kind is Kind.INPUT for name in one.leaves)
+    refused = next((leaf.name for leaf in inputs if refusable(leaf)), None)
+    if refused is None:
+        return
+    for output in declared:
+        if output.kind is not Kind.OUTPUT or any(leaves[name].safe is not None for name in output.leaves):
+            continue
+        yield _warning(
+            Code.STAYS_AFTER_FAULT,
+            f"output `{output.name}` stays as it was while a reading of `{refused}` is refused",
+            output.span,
+            "write what it is to show then, such as `safe false` after its type, or after that of a field of its record",
+        )
+
+
+def _numbered(leaf: str) -> bool:
+    """Return whether a leaf is the number, or its echo, of an order or a report."""
+    return leaf.endswith((f".{NUMBER}", f".{ECHO}"))
 
 
 # --- variables without a start ---
