@@ -22,8 +22,8 @@ level's state; it does not depend on the number of lines.
 
 Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flows: `declared_plant` and `description`, `links` (declared
 alike at both ends), `signature`, `executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run),
-`buffers`, `levels`, `adopt` (starting again), `faults` (of plants), `system`; rooms `orders` (scripts), `plant` (what moves), `log` and
-`processes`.
+`buffers`, `levels`, `adopt` (starting again), `faults` (of plants), `system`; rooms `orders` (scripts), `plant` (what moves), `log`,
+`unset` (what had no value yet), `processes`, `link` (the C of a whole system), `episodes` and `campaign` (many of them).
 """
 
 import sys

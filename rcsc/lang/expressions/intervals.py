@@ -7,7 +7,7 @@ those of the extreme operands, computed in the same arithmetic. Singles alike, r
 import math
 from collections.abc import Iterable
 from itertools import product
-from typing import TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import I64_MAX, I64_MIN, U64_MAX, Apply, Expr, Int, Real, Scalar, Select, Single, Unit
@@ -17,6 +17,8 @@ WIDEST = 2**200
 """Integer bounds stop here: a result beyond 64 bits is refused by its own proof obligation."""
 
 Number = TypeVar("Number", int, float)
+AtEnds: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.MIN, Op.MAX]
+"""Operations whose extreme results are those of the ends of their operands."""
 
 
 def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
@@ -73,6 +75,7 @@ def _reals(
     op: Arithmetic, a: tuple[float, float], b: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[float, float] | None:
     """Return the bounds; None where an operand may be infinite, or a divisor zero."""
+    assert op is not Op.MOD
     if not all(map(math.isfinite, (*a, *b))):
         return None
     if op is not Op.DIV:
@@ -84,9 +87,9 @@ def _reals(
 
 
 def _ends(
-    op: Arithmetic, a: tuple[Number, Number], b: tuple[Number, Number], zero: Number
+    op: AtEnds, a: tuple[Number, Number], b: tuple[Number, Number], zero: Number
 ) -> tuple[Number, Number]:
-    """Return the bounds of an operation that integers and reals share; they lie at the ends of the operands."""
+    """Return the bounds of an operation that integers and reals share."""
     match op:
         case Op.NEG:
             return -a[1], -a[0]
@@ -101,5 +104,5 @@ def _ends(
             return min(corners) + zero, max(corners) + zero
         case Op.MIN:
             return min(a[0], b[0]), min(a[1], b[1])
-        case _:
+        case Op.MAX:
             return max(a[0], b[0]), max(a[1], b[1])

@@ -77,7 +77,7 @@ class Summary:
     Attributes:
         by_fault: How often each outcome came, by fault class; an episode of two faults counts under both.
         ends: How often each outcome came, with its reason.
-        by_level: Lines reached and lines there are, by level.
+        reached: Lines reached and lines there are, by table.
     """
 
     episodes: int

@@ -48,7 +48,7 @@ def _held(program: str, op: str, short: str) -> Function:
 
 
 def helper(program: str, name: str) -> Function:
-    """Return the function of one operator or conversion, by its name in `Invoke.helper`; `interpret.OPERATORS` defines its meaning."""
+    """Return the function of one operator or conversion, by its name in `Invoke.helper`; `lang/operator_table.py` defines its meaning."""
     a, b = Name("a"), Name("b")
     if "_of_" in name:
         target, source = (SHORT[short] for short in name.split("_of_"))
@@ -73,7 +73,7 @@ def helper(program: str, name: str) -> Function:
         return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (Leave(absolute or a),))
     if op in HELD:
         return _held(program, op, short)
-    sign, word = ("<", "lesser") if op == "min" else (">", "greater")
+    sign, word = {"min": ("<", "lesser"), "max": (">", "greater")}[op]
     return Function(
         f"The {word} of two; the first where it is no number.",
         f"{kind} {program}_{name}({kind} a, {kind} b)",
