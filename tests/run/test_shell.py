@@ -1072,3 +1072,13 @@ def test_a_pipe_that_is_used_is_not_waited_for(tmp_path: Path) -> None:
     (tmp_path / "t.rcs").write_text("use words\n")
     os.mkfifo(tmp_path / "words.rcs")
     assert "words.rcs" not in kept(tmp_path / "t.rcs").texts
+
+
+def test_names_are_what_the_command_tells_of_the_level_chosen(shell: Commands) -> None:
+    told = CliRunner().invoke(group, ["names", str(SYSTEM), "--find", "force"]).output
+    of_gripper = told[told.index("level gripper") :].split("\nlevel ")[0].splitlines()
+    do(shell, "level gripper")
+    assert [line for line in do(shell, "names force") if line] == [line for line in of_gripper if line]
+    assert do(shell, "names task")[0].startswith("level task: ")
+    assert len(do(shell, "names")) > len(do(shell, "names force"))
+    assert "no variable of level `gripper` has `forcee`" in str(refused(shell, "names forcee"))

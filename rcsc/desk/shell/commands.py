@@ -22,6 +22,7 @@ from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import NAME, known_name, normal
 from rcsc.run.orders.roles import served
+from rcsc.views.trace.names import named, names_text
 
 Output = list[str]
 _SHOW = re.compile(rf"(?P<name>{NAME})\s*\?$")
@@ -39,6 +40,8 @@ level [LEVEL]           choose a level
 levels                  all levels
 lines                   the line that each level ran last
 show [LEVEL]            what the last cycle changed, and what was set since; all variables of a level
+names [WORD]            the data dictionary: what each variable of the level chosen is, who writes it and who reads it; those in
+                        whose name, meaning or type WORD stands, or those of the level WORD
 buffers [NAME]          the latest value of each buffer
 step [N]                N cycles of all levels
 step LEVEL [N]          N cycles of one level alone: its neighbours are what its buffers say
@@ -133,6 +136,7 @@ class Commands:
             "expect": self._expect, "fault": self._fault, "faults": self._faults,
             "freeze": self._freeze, "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
             "lines": self._lines, "log": self._log, "quit": self._quit, "reload": self._reload, "restart": self._restart, "run": self._run,
+            "names": self._names,
             "show": self._show, "step": self._step, "thaw": self._thaw, "undo": self._undo,
         }  # fmt: skip
 
@@ -229,6 +233,19 @@ class Commands:
             return self.session.changed() or ["the last cycle changed nothing"]
         level = typed_names.level_of(rest, self.session.levels)
         return [typed_names.shown(level, at) for at in range(len(level.sign.leaves))]
+
+    def _names(self, rest: str) -> Output:
+        other = next((level for level in self.session.levels if level.name == rest), None)
+        level, word = (self.session.level, rest) if other is None else (other, "")
+        every = named(self.session.program(level), {}, self.session.system.description)
+        found = [one for one in every if one.speaks_of(word)]
+        if not found:
+            raise Refused(
+                Code.SHELL_NAME,
+                f"no variable of level `{level.name}` has `{word}` in its name, meaning or type",
+                "`level LEVEL` chooses another level",
+            )
+        return names_text(found).splitlines()
 
     def _buffers(self, rest: str) -> Output:
         every = [

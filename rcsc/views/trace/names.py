@@ -86,6 +86,12 @@ class NamedVariable:
         among = f" of {', '.join(self.members)}" if self.members else ""
         return f"{self.type}{within}{among}{f' {self.unit}' if self.unit else ''}"
 
+    def speaks_of(self, word: str) -> bool:
+        """Return whether a word stands in its name, meaning, type or members; capitals do not matter."""
+        return any(
+            word.lower() in text.lower() for text in (self.name, self.meaning, self.type, *self.members)
+        )
+
 
 def named(
     program: Program, places: Mapping[str, str], system: Description | None = None

@@ -49,7 +49,7 @@ def command(paths: tuple[str, ...], form: str | None, asked: str, out: Path | No
     `log` and the generated code.
     """
     try:
-        found = [one for one in dictionary(paths) if _speaks_of(one, asked)]
+        found = [one for one in dictionary(paths) if one.speaks_of(asked)]
     except WrongError as error:
         return error.shown("names")
     if not found:
@@ -69,10 +69,6 @@ def command(paths: tuple[str, ...], form: str | None, asked: str, out: Path | No
             text = names_text(found)
     written(text, out)
     return 0
-
-
-def _speaks_of(one: NamedVariable, word: str) -> bool:
-    return any(word.lower() in text.lower() for text in (one.name, one.meaning, one.type, *one.members))
 
 
 def dictionary(paths: tuple[str, ...]) -> Iterator[NamedVariable]:
