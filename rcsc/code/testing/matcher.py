@@ -30,7 +30,7 @@ from itertools import chain, islice
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files.read import MOST_OF_OURS, content
 from rcsc.base.host.tools import Absent, c_compiler, run_command, write_c
-from rcsc.code.emit.c.matching.masks import classes_of, leaves_of, mask_probe
+from rcsc.code.emit.c.matching import classes_of, leaves_of, mask_probe
 from rcsc.code.emit.lower import lower_by_force
 from rcsc.code.emit.plan import (
     WORD,
