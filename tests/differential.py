@@ -34,7 +34,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from rcsc.code.emit import emit_c, emit_python
+from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower
 from rcsc.lang.interpret import cycle, initial
 from rcsc.lang.model import AssumptionName, Program, ProvedProgram, seal_of_proof
@@ -1540,7 +1540,7 @@ def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
     if not isinstance(program, Program):
         return program
     plan = lower(ProvedProgram(program, seal_of_proof()))
-    files = emit_c(plan) | emit_python(plan)
+    files = emitted(plan)
     [symbols] = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
     return Built(drawn, program, symbols, files)
 

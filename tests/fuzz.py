@@ -20,9 +20,8 @@ from pathlib import Path
 from types import ModuleType
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
-from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower
-from rcsc.code.emit.python import emit_python
 from rcsc.lang import reserved
 from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
 from rcsc.lang.resolve import compile_text
@@ -60,9 +59,9 @@ def run(text: str) -> Outcome:
     if verdict.proved is None:
         return Outcome(_codes(verdict.findings, text), time.monotonic() - begun)
     plan = lower(verdict.proved)
-    for name, emitted in (*emit_python(plan).items(), *emit_c(plan).items()):
+    for name, code in emitted(plan).items():
         if name.endswith(".py"):
-            compile(emitted, name, "exec")
+            compile(code, name, "exec")
     return Outcome(("proved",), time.monotonic() - begun)
 
 
@@ -303,7 +302,7 @@ def links_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[st
                 told.update(f"links refused {code}" for code in set(_codes(program, text)))
                 continue
             plan = lower(ProvedProgram(program, seal_of_proof()))
-            files = emit_c(plan) | emit_python(plan)
+            files = emitted(plan)
             with tempfile.TemporaryDirectory(prefix="rcsc-links-") as place:
                 for cc in compilers:
                     compiled(files, Path(place), cc)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rcsc.code.emit import emit_c
+from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower
 from rcsc.lang.model import ProvedProgram, seal_of_proof
 from rcsc.lang.project import load
@@ -253,9 +253,8 @@ def matches() -> Iterator[Cost]:
 def size(lines: int, variables: int) -> Cost:
     """Bytes of the C of a large table, and what the compiler needs for it."""
     program = compiled(families.box(lines, variables, lines + variables))
-    files = emit_c(
-        lower(ProvedProgram(program, seal_of_proof()))
-    )  # right by construction; `proofs` proves it
+    plan = lower(ProvedProgram(program, seal_of_proof()))  # right by construction; `proofs` proves it
+    files = emitted(plan, ("c",))
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         for name, text in files.items():

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc.code.emit import emit_c, emit_python
+from rcsc.code.emit import emitted
 from rcsc.code.emit.c.ctext import CText
 from rcsc.code.emit.code_tree import IN_C
 from rcsc.code.emit.identifiers import names_of
@@ -344,7 +344,7 @@ def measured(label: str, program: Program) -> Measured:
         plan = lower(verdict.proved)
     else:
         plan = lower(ProvedProgram(program, seal_of_proof()))  # right by construction; `proofs` proves them
-    files = {**emit_c(plan), **emit_python(plan)}
+    files = emitted(plan)
     with tempfile.TemporaryDirectory() as scratch:
         ours, scan, size = c_counts(Path(scratch), program, files)
         timed = c_ns(Path(scratch), program, names_of(program).program)

@@ -14,7 +14,7 @@ import pytest
 from rcsc.base.diagnostics.jsonform import table_to_json
 from rcsc.base.diagnostics.report import TableReport
 from rcsc.base.host.files.plain import plain, read
-from rcsc.code.emit import TARGETS, emit_c, emit_python
+from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import write
 from rcsc.code.emit.lower import lower
 from rcsc.code.testing.executors.equality import same_value
@@ -361,7 +361,7 @@ def made(tmp_path: Path, *, defensive: bool) -> list[PythonExecutor | CExecutor]
     verdict = verdict_of(CHECKED)
     assert verdict.proved is not None, verdict.findings
     plan = lower(verdict.proved, defensive=defensive)
-    write(emit_c(plan) | emit_python(plan), str(tmp_path))
+    write(emitted(plan), str(tmp_path))
     sign = signature(next((tmp_path / "c").glob("*.json")))
     library = build(tmp_path, [sign])
     return [PythonExecutor(tmp_path, sign, sign.levels[0]), CExecutor(library, sign, sign.levels[0])]

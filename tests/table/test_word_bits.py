@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import holds
@@ -184,7 +184,7 @@ def test_a_right_table_of_masks_is_proved_certified_and_compiled_to_masks() -> N
     assert verdict.tables[0].backing.method == "boxes"
     assert verdict.certificate is not None
     assert not check_certificate(program, verdict.certificate)
-    text = "".join(emit_c(lower(verdict.proved)).values())
+    text = "".join(emitted(lower(verdict.proved), ("c",)).values())
     assert "((s->statusword & 0x6fu) == 0x21u)" in text
     assert not re.search(r"statusword [/%]", text)
 

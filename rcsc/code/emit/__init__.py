@@ -39,12 +39,10 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from rcsc.code.emit.c.c99 import emit_c, outward, rendered_c
+from rcsc.code.emit.c.c99 import outward, rendered_c
 from rcsc.code.emit.plan import Plan
-from rcsc.code.emit.python import emit_python, rendered_python
+from rcsc.code.emit.python import rendered_python
 from rcsc.code.emit.rendering import Rendered
-
-__all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted", "rendered"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -224,7 +224,7 @@ def _units(program: Program, p: str, places: Mapping[str, str], prefix: str) -> 
     declared = {kind.name: kind.file for kind in program.types}
     needs = {file: {file} for file in sorted(set(declared.values()))}
     for record in program.records:
-        needs[record.file] |= {declared[name] for name in _named(record)}
+        needs[record.file] |= {declared[part.name] for part in parts_of(record)}
     for middle, beyond in needs.items():
         for others in needs.values():
             if middle in others:
@@ -246,14 +246,14 @@ def _unit(program: Program, own: tuple[str, str], file: str, places: Mapping[str
     return f"{word}_" if types_header(word) == f"{p}.h" else word
 
 
-def _named(record: Record) -> Iterator[str]:
-    """Yield the names of the types that a record's own fields have."""
+def parts_of(record: Record) -> Iterator[Enum | Record]:
+    """Yield the declared types of a record's own fields."""
     for part in record.fields:
         kind = part.type
         while isinstance(kind, Array):
             kind = kind.element
         if isinstance(kind, Enum | Record):
-            yield kind.name
+            yield kind
 
 
 def _types(program: Program, units: Mapping[str, str], scope: NameScope) -> dict[str, str]:

@@ -144,17 +144,13 @@ def _matcher(program: Program, table: Table) -> Matcher:
             else:
                 by_leaf.setdefault(test.variables[0], []).append((at, test.box))
     everyone = (1 << len(table.lines)) - 1
-    probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
+    probes = [
+        _leaf_probe(variables[name], by_leaf[name], everyone) for name in table.variables if name in by_leaf
+    ]
     probes += [_test_probe(truth, lines, everyone) for truth, lines in relational.values()]
     one_word = len(table.lines) <= WORD
     groups = grouped(probes, FEW_GROUPED if one_word else MOST_GROUPED, shifted=one_word)
     return Matcher(len(table.lines), table.default is not None, groups)
-
-
-def _declared(
-    table: Table, by_leaf: dict[str, list[tuple[int, Box]]]
-) -> list[tuple[str, list[tuple[int, Box]]]]:
-    return [(name, by_leaf[name]) for name in table.variables if name in by_leaf]
 
 
 def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:

@@ -81,13 +81,8 @@ MOST_GROUPED = 512
 """Up to so many combinations of classes leaves share a tuple of masks."""
 
 
-def emit_python(plan: Plan) -> dict[str, str]:
-    """The Python module of the plan, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in rendered_python(plan).items()}
-
-
 def rendered_python(plan: Plan) -> dict[str, Rendered]:
-    """The Python module of the plan, with where its lines come from."""
+    """Return the Python module of the plan, by its path below the generated folder, with where its lines come from."""
     maker = _Maker(plan)
     file = f"python/{maker.names.program}.py"
     return {file: render("module.py.jinja", maker.view(), file)}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.code.emit.c.c99 import emit_c
+from rcsc.code.emit import emitted
 from rcsc.code.emit.lower import lower_by_force
 from rcsc.code.emit.scope import SIGNIFICANT, abbreviated, c_scope
 from rcsc.front.commands import run
@@ -64,7 +64,7 @@ def test_shipped_programs_and_the_gallery(root: str, repo: Path, tmp_path: Path)
     loaded = load([str(repo / "tables" / root)])
     program = resolve(loaded.roots[0], loaded)
     assert isinstance(program, Program), program
-    differ_in_time(emit_c(lower_by_force(program, str(repo / "tables"))), tmp_path)
+    differ_in_time(emitted(lower_by_force(program, str(repo / "tables")), ("c",)), tmp_path)
 
 
 def test_the_shipped_system(repo: Path, tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ level LEVEL_b { period 10 [ms] table TABLE_b }
 @pytest.mark.parametrize("file", ["case.rcs", f"{LONG}_of_a_file.rcs"])
 def test_names_that_only_their_ends_tell_apart(file: str, tmp_path: Path) -> None:
     text = re.sub(r"\b([A-Z]+)(?=_[ab]\b|_[ab]_|\b)", lambda word: f"{word[1].lower()}_{LONG}", PROGRAM)
-    files = emit_c(lower_by_force(program_of(text, file)))
+    files = emitted(lower_by_force(program_of(text, file)), ("c",))
     differ_in_time(files, tmp_path)
 
 

@@ -6,10 +6,9 @@ from pathlib import Path
 from hypothesis import reject
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.code import emit
 from rcsc.code.emit import TARGETS
-from rcsc.code.emit.c.c99 import emit_c
 from rcsc.code.emit.lower import lower
-from rcsc.code.emit.python import emit_python
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
@@ -97,8 +96,7 @@ def errors(found: Iterable[Diagnostic]) -> list[str]:
 
 def emitted(program: Program) -> dict[str, str]:
     """Return the generated files by path, the proof taken as given."""
-    plan = lower(ProvedProgram(program, seal_of_proof()))
-    return emit_c(plan) | emit_python(plan)
+    return emit.emitted(lower(ProvedProgram(program, seal_of_proof())))
 
 
 def compile_beside(*sources: Path) -> None:

@@ -82,13 +82,8 @@ def _view(c: CProgram) -> dict[str, object]:
     }
 
 
-def emit_c(plan: Plan) -> dict[str, str]:
-    """The C files of the plan, by path below the generated folder."""
-    return {file: rendered.text for file, rendered in rendered_c(plan).items()}
-
-
 def rendered_c(plan: Plan) -> dict[str, Rendered]:
-    """The C files of the plan, each with where its lines come from."""
+    """Return the C files of the plan, by path below the generated folder, each with where its lines come from."""
     c = _program(plan)
     view, name = _view(c), c.p
     header, source = f"c/{name}.h", f"c/{name}.c"

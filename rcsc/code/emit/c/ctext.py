@@ -86,20 +86,19 @@ def c_type(kind: Scalar) -> str:
     raise ValueError(kind)  # resolve keeps ranges within 64 bits
 
 
-def stored_type(kind: Scalar, *, defensive: bool) -> str:
-    """Return the type of a leaf in the state. Where any bytes may come, a truth value is a byte: not all bytes are a valid bool."""
-    return "uint8_t" if defensive and isinstance(kind, Bool) else c_type(kind)
-
-
 def declared(names: Names, name: str, kind: model.Type, *, defensive: bool) -> str:
-    """Spell a member's declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
+    """Spell a member's declaration: the type of the innermost elements, the name, the lengths from the outermost in.
+
+    Where any bytes may come, a truth value is a byte: not all bytes are a valid bool.
+    """
     lengths = ""
     while isinstance(kind, model.Array):
         lengths += f"[{kind.length}]"
         kind = kind.element
     if isinstance(kind, model.Record | Enum):
         return f"{names.types[kind.name]} {name}{lengths}"
-    return f"{stored_type(kind, defensive=defensive)} {name}{lengths}"
+    held = "uint8_t" if defensive and isinstance(kind, Bool) else c_type(kind)
+    return f"{held} {name}{lengths}"
 
 
 def wide_type(kind: Scalar) -> str:

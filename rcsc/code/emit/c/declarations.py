@@ -7,7 +7,7 @@ from typing import TypeAlias
 from rcsc.code.emit.c.cprogram import CProgram
 from rcsc.code.emit.c.ctext import c_type, declared, wide_type
 from rcsc.code.emit.c.layout import record_size, sizes
-from rcsc.code.emit.identifiers import DIGEST, comment, parameter_word, types_guard, types_header
+from rcsc.code.emit.identifiers import DIGEST, comment, parameter_word, parts_of, types_guard, types_header
 from rcsc.code.emit.plan import Origin, Sort, infrastructure, table_position
 from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.scope import c_scope
@@ -48,7 +48,7 @@ def type_headers(c: CProgram) -> dict[str, Rendered]:
         files = [file for file, word in c.names.units.items() if word == unit]
         enums = [enum for enum in c.program.enums if enum.file in files]
         records = [record for record in c.program.records if record.file in files]
-        needed = {c.names.units[part.file] for record in records for part in _parts(record)}
+        needed = {c.names.units[part.file] for record in records for part in parts_of(record)}
         view = {
             "source": comment(_source(c, files[0])),
             "mark": c.plan.mark,
@@ -76,16 +76,6 @@ def shared(c: CProgram) -> dict[str, list[str]]:
     for enum in c.program.enums:
         names[c.names.units[enum.file]] += c.names.constants[enum.name]
     return names
-
-
-def _parts(record: model.Record) -> Iterator[Enum | model.Record]:
-    """Yield the declared types of a record's own fields."""
-    for part in record.fields:
-        kind = part.type
-        while isinstance(kind, model.Array):
-            kind = kind.element
-        if isinstance(kind, Enum | model.Record):
-            yield kind
 
 
 def _enum(c: CProgram, enum: Enum) -> tuple[str, str, str, Fields, Origin]:

@@ -88,10 +88,9 @@ def failing(program: Program) -> frozenset[str]:
 def callees_first(program: Program) -> list[Procedure]:
     """Return the procedures that lines and levels run, each after those that it calls; in declared order where that is free."""
     by_name = {p.name: p for p in program.procedures}
-    rows = [line.actions for table in program.tables for line in table.lines]
-    rows += [table.default.actions for table in program.tables if table.default is not None]
+    lines = (line for table in program.tables for line in table.every_line)
     run = {name for level in program.levels for name in (*level.preprocess, *level.postprocess)}
-    run |= set(_called([action.statement for actions in rows for action in actions]))
+    run |= set(_called(action.statement for line in lines for action in line.actions))
     order: dict[str, Procedure] = {}
 
     def visit(procedure: Procedure) -> None:

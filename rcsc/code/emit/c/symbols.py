@@ -12,18 +12,15 @@ from rcsc.lang.leaves import may_write
 from rcsc.lang.model import (
     Admit,
     Bool,
-    Default,
     Enum,
     Int,
     Kind,
-    Line,
     OneTable,
     Program,
     Read,
     Real,
     Role,
     Roles,
-    Table,
     TableChoice,
     Variable,
     VariableName,
@@ -214,14 +211,10 @@ def _by_line(program: Program) -> Mapping[str, Mapping[str, frozenset[VariableNa
     return {
         table.name: {
             line.name: may_write((action.statement for action in line.actions), procedures)
-            for line in _lines(table)
+            for line in table.every_line
         }
         for table in program.tables
     }
-
-
-def _lines(table: Table) -> tuple[Line | Default, ...]:
-    return table.lines if table.default is None else (*table.lines, table.default)
 
 
 def _by_level(program: Program) -> Mapping[str, frozenset[VariableName]]:
