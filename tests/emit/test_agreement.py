@@ -16,14 +16,20 @@ import pytest
 
 from rcsc.base.host.tools import Absent, BuildFailed, c_compiler
 from rcsc.code.emit.generated import write
-from rcsc.code.testing.agree import AgreementCount, Disagreement, Executors, run_init, run_sanitized
-from rcsc.code.testing.differential_search import search_lines, search_sessions
+from rcsc.code.testing.agree import (
+    AgreementCount,
+    Disagreement,
+    Executors,
+    run_init,
+    run_sanitized,
+    search_lines,
+    search_sessions,
+)
 from rcsc.code.testing.esbmc import EsbmcAnswer, prove_function
-from rcsc.code.testing.executors.equality import same_value
 from rcsc.code.testing.executors.externs import python_stand_ins, with_c_stand_ins
 from rcsc.code.testing.executors.native import Native, build
 from rcsc.code.testing.executors.python import python_executor
-from rcsc.code.testing.executors.sessions import Seen
+from rcsc.code.testing.executors.sessions import Seen, same_value
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.code.testing.executors.targets import is_matcher, targets
 from rcsc.code.testing.suite import SuiteOptions, run_suite

@@ -19,7 +19,7 @@ from rcsc.code.emit.plan import Plan
 from rcsc.code.testing.code_mutants import CodeMutant, code_mutants, variants
 from rcsc.code.testing.coverage import directed
 from rcsc.code.testing.coverage.case import MODES, Case, Entry, entries, expected
-from rcsc.code.testing.coverage.choose import Choice, chosen
+from rcsc.code.testing.coverage.choose import Choice, chosen, taken
 from rcsc.code.testing.coverage.document import (
     VectorSet,
     as_json,
@@ -30,7 +30,6 @@ from rcsc.code.testing.coverage.document import (
 )
 from rcsc.code.testing.coverage.goals import Reached, decides
 from rcsc.code.testing.coverage.harness import vectors_c
-from rcsc.code.testing.coverage.lines import taken
 from rcsc.code.testing.coverage.marks import marked, ways_of
 from rcsc.code.testing.coverage.vector_set import vector_set, write_vectors
 from rcsc.code.testing.executors.symbols import symbols_of

@@ -17,7 +17,7 @@ from rcsc.base.host.files.plain import plain, read
 from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import write
 from rcsc.code.emit.lower import lower
-from rcsc.code.testing.executors.equality import same_value
+from rcsc.code.testing.executors.sessions import same_value
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.driver.compile import compile_

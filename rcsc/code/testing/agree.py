@@ -1,26 +1,31 @@
 """Interpreter, Python executor and C executor on the same inputs: line, fault, failed assumptions, state.
 
-In: a program, its executors, sessions. Out: the first disagreement of a session, and what was compared. The
-complete state is compared after every cycle, and each executor carries its own from cycle to cycle. Cycles in
-which assumptions fail are like others: no executor does anything undefined in them.
+In: a program, its executors, sessions, or how many to draw. Out: the first disagreement of a session, and what was compared;
+of drawn sessions, which are the same each time, the simplest disagreement. The complete state is compared after every cycle, and
+each executor carries its own from cycle to cycle. Cycles in which assumptions fail are like others: no executor does anything
+undefined in them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from random import Random
 
 from rcsc.base.host.tools import Absent, BuildFailed
 from rcsc.code.testing.executors.edges import may_be_matched
 from rcsc.code.testing.executors.externs import begin
 from rcsc.code.testing.executors.native import Native, NativeRun
+from rcsc.code.testing.executors.python import PythonUnderTest
 from rcsc.code.testing.executors.reference_file import all_lines, fault_named, monitored
 from rcsc.code.testing.executors.sessions import Seen, Stimuli, differences
 from rcsc.code.testing.executors.targets import ComparedFunction
-from rcsc.lang.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
-from rcsc.lang.model import LineName, Program, Snapshot, Table, Value
+from rcsc.code.testing.inputs import sampling
+from rcsc.lang.interpret import Fault, Outcome, cycle, holds, initial, matching_lines, run_table
+from rcsc.lang.model import LineName, Program, Snapshot, Table
 
 NONE, SEVERAL = -1, -2
+TOGETHER = 8
+"""Snapshots that go through a matcher at once, of those drawn."""
 WHOLE = 1
 """Mode in which each row sets every leaf; see `shim`."""
 
@@ -73,26 +78,13 @@ class AgreementCount:
         return [(which, mode, rows_of(session)) for which, mode, session, _ in self.kept]
 
 
-class PythonRuns(Protocol):
-    """What the emitted Python does; see `executors.python`."""
-
-    def run(self, target: ComparedFunction, session: Stimuli) -> list[Seen]:
-        """Runs a session."""
-
-    def initial(self) -> dict[str, Value]:
-        """A new state's leaves."""
-
-    def line(self, target: ComparedFunction, snapshot: Snapshot) -> int:
-        """What the emitted `line` function gives."""
-
-
 @dataclass(frozen=True, slots=True)
 class Executors:
     """The executors of one program."""
 
     program: Program
     native: Native
-    python: PythonRuns
+    python: PythonUnderTest
     targets: tuple[ComparedFunction, ...]
 
     def number(self, target: ComparedFunction) -> int:
@@ -132,9 +124,9 @@ def rows_of(session: Stimuli) -> list[Snapshot]:
     return [{**session.start, **readings} for readings in session.readings]
 
 
-def keeps_invariants(program: Program, session: Stimuli) -> bool:
-    """Whether the start can be a state of the program as far as its invariants say."""
-    return all(holds(invariant.condition, session.start) for invariant in program.invariants)
+def keeps_invariants(program: Program, start: Snapshot) -> bool:
+    """Return whether it can be a state of the program as far as its invariants say."""
+    return all(holds(invariant.condition, start) for invariant in program.invariants)
 
 
 def run_session(
@@ -171,7 +163,7 @@ def run_session(
 
 def run_init(executors: Executors, target: ComparedFunction) -> Disagreement | None:
     """Compares the initial states."""
-    start = {str(v.name): v.initial for v in executors.program.variables}
+    start = initial(executors.program)
     [row] = executors.native.run(executors.number(target), WHOLE, [start])
     for name, snapshot in (("C", row.snapshot), ("Python", executors.python.initial())):
         right, seen = (Seen(0, "", NONE, (), values) for values in (start, snapshot))
@@ -240,3 +232,81 @@ def run_sanitized(
                 function = executors.targets[which // 2].function
                 return Disagreement("C with sanitizers", function, at + 1, session, words)
     return None
+
+
+# --- drawn inputs ---
+
+
+def search_sessions(
+    executors: Executors,
+    target: ComparedFunction,
+    compared: AgreementCount,
+    examples: int,
+    most_cycles: int = 8,
+) -> Disagreement | None:
+    """Run drawn sessions of a step or a cycle until the executors disagree.
+
+    Args:
+        executors: The program's executors.
+        target: The step or cycle.
+        compared: Counts what was compared.
+        examples: How many sessions.
+        most_cycles: Longest session.
+    """
+    program = executors.program
+    known, table = sampling.declarations(program), _aimed_at(program, target)
+
+    def begins(start: Snapshot) -> bool:
+        return keeps_invariants(program, start)
+
+    def differs(stimuli: Stimuli) -> Disagreement | None:
+        return run_session(executors, target, stimuli, compared) if begins(stimuli.start) else None
+
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    drawn = sampling.sessions(known, lambda: table, most_cycles, random, examples, begins)
+    ran = (run_session(executors, target, stimuli, compared) for stimuli in drawn)
+    found = next(filter(None, ran), None)
+    return found and _simplest(program, found, differs)
+
+
+def search_lines(
+    executors: Executors, target: ComparedFunction, compared: AgreementCount, examples: int
+) -> Disagreement | None:
+    """Run drawn snapshots through a matcher, some at a time, until the executors disagree."""
+    program = executors.program
+    known, table = sampling.declarations(program), _aimed_at(program, target)
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    for _ in range(max(1, examples // TOGETHER)):
+        drawn = [sampling.snapshot(known, table, random) for _ in range(TOGETHER)]
+        if found := run_lines(executors, target, drawn, compared):
+            return _simplest(program, found, lambda one: run_lines(executors, target, [one.start], compared))
+    return None
+
+
+def _aimed_at(program: Program, target: ComparedFunction) -> Table:
+    """Return the table whose lines the inputs should aim at."""
+    if target.kind != "cycle":
+        return program.tables[target.number]
+    return program.table(program.levels[target.number].tables.names[0])
+
+
+def _simplest(
+    program: Program, disagreement: Disagreement, differs: Callable[[Stimuli], Disagreement | None]
+) -> Disagreement:
+    """Return the disagreement shrunk step by step to few cycles and few values that are not initial."""
+    for stimuli in _shorter(disagreement):
+        disagreement = differs(stimuli) or disagreement
+    for name, value in initial(program).items():
+        session = disagreement.session
+        readings = tuple({**r, name: value} if name in r else r for r in session.readings)
+        disagreement = differs(Stimuli({**session.start, name: value}, readings)) or disagreement
+    return disagreement
+
+
+def _shorter(disagreement: Disagreement) -> Iterator[Stimuli]:
+    """Yield the session cut after the cycle that differs, then its last cycles alone."""
+    start, kept = disagreement.session.start, disagreement.session.readings[: disagreement.cycle]
+    yield Stimuli(start, kept)
+    for count in (4, 2, 1):
+        if count < len(kept):
+            yield Stimuli(start, kept[-count:])

@@ -17,7 +17,7 @@ from time import perf_counter
 
 from rcsc.base.host.children import Ran, scratch
 from rcsc.base.host.tools import Absent, esbmc, run_command, write_c
-from rcsc.code.testing.executors.externs import STAND_INS, externs
+from rcsc.code.testing.executors.externs import STAND_INS, externs, stand_in_head
 from rcsc.code.testing.executors.reference_file import all_lines, monitored, reference_c
 from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.code.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
@@ -97,16 +97,12 @@ def _externs(program: Program, symbols: Symbols) -> Iterator[str]:
     yield "static int rcsc_again = 0; static void rcsc_calls(void);"
     ends = []
     for at, procedure in enumerate(externs(program)):
-        read = [symbols.c_type(name) for name in procedure.reads]
-        read += [symbols.value_type(p.type) for p in procedure.params]
+        head, read = stand_in_head(symbols, procedure)
         written = [symbols.c_type(name) for name in procedure.writes]
-        given = [f"{c_type} a{i}" for i, c_type in enumerate(read)] + [
-            f"{c_type} *w{i}" for i, c_type in enumerate(written)
-        ]
         yield from (f"static {c_type} e{at}_a{i}[{MOST_CALLS}];" for i, c_type in enumerate(read))
         yield from (f"static {c_type} e{at}_w{i}[{MOST_CALLS}];" for i, c_type in enumerate(written))
         yield f"static uint32_t e{at}_n[2];"
-        yield f"void {procedure.extern.c if procedure.extern else ''}({', '.join(given) or 'void'}) {{"
+        yield f"{head} {{"
         yield f"const uint32_t n = e{at}_n[rcsc_again]; e{at}_n[rcsc_again] = n + 1u;"
         yield f'__ESBMC_assert(n < {MOST_CALLS}u, "{RECORD}"); __ESBMC_assume(n < {MOST_CALLS}u);'
         yield "if (rcsc_again == 0) {"
@@ -121,7 +117,7 @@ def _externs(program: Program, symbols: Symbols) -> Iterator[str]:
             )
             yield f'__ESBMC_assert({same}, "an extern is given what the reference gives it");'
         yield "}"
-        yield from (f"*w{i} = e{at}_w{i}[n];" for i, _ in enumerate(written))
+        yield from (f"*r{i} = e{at}_w{i}[n];" for i, _ in enumerate(written))
         yield "}"
         ends.append(f'__ESBMC_assert(e{at}_n[0] == e{at}_n[1], "externs are called as often");')
     yield f"static void rcsc_calls(void) {{ {' '.join(ends)} }}"
@@ -138,13 +134,11 @@ def _claims(program: Program, symbols: Symbols) -> Iterator[str]:
 
 
 def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
-    trace = symbols.trace
     yield '__ESBMC_assert(result == r.fault, "fault code");'
-    yield f'__ESBMC_assert({trace.line("a")} == r.line, "line taken");'
-    refused = f"r.fault == 0 || {trace.fault_at('a')} == r.fault_at"
-    yield f'__ESBMC_assert({refused}, "reading refused");'
+    yield '__ESBMC_assert(a.line == r.line, "line taken");'
+    yield '__ESBMC_assert(r.fault == 0 || a.fault_at == r.fault_at, "reading refused");'
     for number, _ in enumerate(monitored(program)):
-        failed = f"{trace.failed('a', number)} == (r.failed[{number}] != 0u)"
+        failed = f"{symbols.failed_bit('a', number)} == (r.failed[{number}] != 0u)"
         yield f'__ESBMC_assert({failed}, "assumption {number}");'
 
 
@@ -206,7 +200,10 @@ def part_harness(
     elif part == "safe":
         body = [f"{struct} b = a; ref_safe(&b); {function}(&a);", *same]
     else:
-        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {symbols.trace.clear('a')} ref_deferred(&a);"]
+        clear = " ".join(
+            ["a.line = -1; a.fault = 0; a.fault_at = -1;", *(f"a.{path} = 0;" for path in symbols.failed)]
+        )
+        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {clear} ref_deferred(&a);"]
         table = program.tables[target.number]
         if line == len(all_lines(table)):
             body += [f"__ESBMC_assume(ref_t{target.number}_safe(&a));"]

@@ -6,7 +6,7 @@ DEFAULT), or it is another table of which exactly one line matches too: then eit
 same for every input, or a snapshot tells the executors of the table and the mutant apart.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations
@@ -15,6 +15,7 @@ from random import Random
 from rcsc.code.testing.inputs.snapshot import InputSearch, Missing, Wanted
 from rcsc.code.testing.inputs.vectors import given_in
 from rcsc.lang.interpret import matching_lines
+from rcsc.lang.interval_sets import joined
 from rcsc.lang.model import (
     Apply,
     Bool,
@@ -106,26 +107,15 @@ def test_of_box(like: Test, kind: Scalar, box: Box) -> Test:
     return Test(", ".join(words), condition, like.variables, box)
 
 
-def merged(box: Sequence[tuple[int, int]]) -> Box:
-    """Intervals sorted and joined where they touch."""
-    intervals: list[tuple[int, int]] = []
-    for low, high in sorted(box):
-        if intervals and low <= intervals[-1][1] + 1:
-            intervals[-1] = (intervals[-1][0], max(high, intervals[-1][1]))
-        else:
-            intervals.append((low, high))
-    return tuple(intervals)
-
-
 def wider(box: Box, kind: Scalar) -> Iterator[Box]:
     """The box with one key more, at each end of each interval."""
     low, high = key_bounds(kind)
     for at, (start, end) in enumerate(box):
         rest = [*box[:at], *box[at + 1 :]]
         if start > low:
-            yield merged([*rest, (start - 1, end)])
+            yield joined([*rest, (start - 1, end)])
         if end < high:
-            yield merged([*rest, (start, end + 1)])
+            yield joined([*rest, (start, end + 1)])
 
 
 def narrower(box: Box) -> Iterator[Box]:
@@ -133,10 +123,10 @@ def narrower(box: Box) -> Iterator[Box]:
     for at, (start, end) in enumerate(box):
         rest = [*box[:at], *box[at + 1 :]]
         if start < end:
-            yield merged([*rest, (start + 1, end)])
-            yield merged([*rest, (start, end - 1)])
+            yield joined([*rest, (start + 1, end)])
+            yield joined([*rest, (start, end - 1)])
         elif rest:
-            yield merged(rest)
+            yield joined(rest)
 
 
 def with_cell(table: Table, row: int, column: int, test: Test | None) -> Table:
@@ -205,10 +195,6 @@ def _swaps(table: Table, first: int, second: int) -> Iterator[TableMutant]:
             yield TableMutant("swap", where, swapped, (str(upper.name), str(lower.name)))
 
 
-def _line(table: Table, name: str) -> Line | None:
-    return next((line for line in table.lines if line.name == name), None)
-
-
 def _holds(line: Line) -> list[Wanted]:
     return [(test, True) for test in line.tests if test is not None]
 
@@ -217,9 +203,10 @@ def difference(search: InputSearch, table: Table, mutant: TableMutant) -> Snapsh
     """A snapshot that a changed line matches in one of the two tables only; NONE if there is none."""
     given = list(given_in(search.program, table))
     answer = Missing.NONE
+    old, new = ({str(line.name): line for line in each.lines} for each in (table, mutant.table))
     for name in mutant.lines:
-        for here, there in ((table, mutant.table), (mutant.table, table)):
-            snapshot = _only(search, given, _line(here, name), _line(there, name))
+        for here, there in ((old, new), (new, old)):
+            snapshot = _only(search, given, here.get(name), there.get(name))
             if not isinstance(snapshot, Missing):
                 return snapshot
             answer = Missing.UNKNOWN if snapshot is Missing.UNKNOWN else answer

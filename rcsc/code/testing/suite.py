@@ -21,6 +21,8 @@ from rcsc.code.testing.agree import (
     run_lines,
     run_sanitized,
     run_session,
+    search_lines,
+    search_sessions,
 )
 from rcsc.code.testing.code_mutants import Noticed, judge_code, portable_agrees
 from rcsc.code.testing.cortex import MOST_INPUTS, CortexRun, run_cortex
@@ -130,15 +132,11 @@ class Suite:
 
     def lines(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A matcher on the vectors and on drawn snapshots."""
-        from rcsc.code.testing.differential_search import search_lines
-
         disagreement = run_lines(self.executors, target, snapshots, self.compared)
         return disagreement or search_lines(self.executors, target, self.compared, self.options.examples)
 
     def steps(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A step from the vectors, a step or cycle in drawn sessions."""
-        from rcsc.code.testing.differential_search import search_sessions
-
         disagreement = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
         options = self.options
         return disagreement or search_sessions(
@@ -148,10 +146,9 @@ class Suite:
     def one_step(self, target: ComparedFunction, snapshot: Snapshot) -> Disagreement | None:
         """One step from a vector."""
         readings = {str(v.name): snapshot[v.name] for v in inputs(self.program)}
-        session = Stimuli(snapshot, (readings,))
-        if not keeps_invariants(self.program, session):
+        if not keeps_invariants(self.program, snapshot):
             return None
-        return run_session(self.executors, target, session, self.compared)
+        return run_session(self.executors, target, Stimuli(snapshot, (readings,)), self.compared)
 
     def sanitized(self) -> str:
         """The sessions under the sanitizers."""

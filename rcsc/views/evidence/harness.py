@@ -4,10 +4,10 @@ In: a program and the names in its C. Out: text: functions of the user's that gi
 each function, with what it asks of its caller: a state that `check` accepts, and of a matcher admitted inputs.
 """
 
-import re
 from collections.abc import Callable, Iterator
 
-from rcsc.code.testing.executors.externs import externs
+from rcsc.code.emit.code_tree import type_bounds
+from rcsc.code.testing.executors.externs import externs, stand_in_head
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.model import Bool, Program, Real, Scalar, key_bounds
 
@@ -31,17 +31,13 @@ def calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
 def stand_ins(program: Program, symbols: Symbols, value: Value) -> Iterator[str]:
     """Yield C functions in place of the user's, which give any value of their types."""
     for procedure in externs(program):
-        given = [symbols.c_type(name) for name in procedure.reads]
-        given += [symbols.value_type(p.type) for p in procedure.params]
-        params = [f"{c_type} a{at}" for at, c_type in enumerate(given)]
-        params += [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
-        function = procedure.extern.c if procedure.extern else ""
+        head, given = stand_in_head(symbols, procedure)
         unread = " ".join(f"(void)a{at};" for at, _ in enumerate(given))
         written = " ".join(
             f"*r{at} = {value(symbols.c_type(name), program.variable(name).type, True)};"
             for at, name in enumerate(procedure.writes)
         )
-        yield f"void {function}({', '.join(params) or 'void'}) {{ {unread} {written} }}"
+        yield f"{head} {{ {unread} {written} }}"
 
 
 def bounds(c_type: str, kind: Scalar, *, whole: bool) -> tuple[int, int]:
@@ -50,5 +46,4 @@ def bounds(c_type: str, kind: Scalar, *, whole: bool) -> tuple[int, int]:
         return 0, 1
     if not whole and not isinstance(kind, Real):
         return key_bounds(kind)
-    bits = int(re.sub(r"\D", "", c_type.removesuffix("_t")))
-    return (0, (1 << bits) - 1) if c_type.startswith("u") else (-(1 << bits - 1), (1 << bits - 1) - 1)
+    return type_bounds(c_type)

@@ -11,8 +11,8 @@ from rcsc.base.diagnostics.source import Source, Span
 from rcsc.code.emit import rendered
 from rcsc.code.emit.plan import Origin, Plan, PlanLine, PlanTable, Sort
 from rcsc.code.emit.rendering import Piece, Rendered
+from rcsc.code.testing.coverage.choose import TakenLine, taken
 from rcsc.code.testing.coverage.document import VectorSet
-from rcsc.code.testing.coverage.lines import TakenLine, taken
 from rcsc.code.testing.inputs.condition_text import words
 from rcsc.lang.leaves import everything, read_by, written_by
 from rcsc.lang.meaning import digest

@@ -31,7 +31,7 @@ Trusted: nothing for a verdict. That nothing more can be reached rests on the sy
 costs: seconds a program.
 
 Modules, in the order the data flows: `marks` counts decisions, `case` is one vector and what it must give, `goals` what
-vectors reach and what is open, `candidates` are tried, `choose` keeps them, `directed` asks for the rest; `lines` are those that
-each takes; `document`
-writes JSON and CSV, `harness` a C file that plays them on its own; `vector_set` is all of it for one program.
+vectors reach and what is open, `candidates` are tried, `choose` keeps them, and says which lines
+each takes; `directed` asks for the rest; `document` writes JSON and CSV, `harness` a C file that plays them on its own;
+`vector_set` is all of it for one program.
 """

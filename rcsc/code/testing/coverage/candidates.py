@@ -17,19 +17,20 @@ from rcsc.code.testing.coverage.case import (
     Entry,
     Expected,
     ends_of,
-    entries,
     outside_of,
     ran,
     refused_at,
+    runs,
 )
 from rcsc.code.testing.coverage.goals import Hit, bits_of
 from rcsc.code.testing.executors.externs import results
+from rcsc.code.testing.executors.reference_file import inputs
 from rcsc.code.testing.executors.sessions import Stimuli
 from rcsc.code.testing.executors.symbols import Symbols
-from rcsc.code.testing.inputs.sampling import declarations, session
+from rcsc.code.testing.inputs.sampling import declarations, sessions
 from rcsc.code.testing.inputs.snapshot import InputSearch, Missing
 from rcsc.code.testing.inputs.vectors import Vector, Vectors
-from rcsc.lang.interpret import initial
+from rcsc.lang.interpret import Answers, initial
 from rcsc.lang.model import (
     Apply,
     Bool,
@@ -53,8 +54,6 @@ from rcsc.lang.model import (
 
 MOST_ENTRIES = 256
 """Of one table of masks, that are tried beside each line; `rcsc test` compares all that there are."""
-TRIES = 10
-"""Sessions that are drawn for each that starts where `check` accepts the state."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,22 +68,6 @@ class Session:
     entry: Entry
     cases: tuple[Case, ...]
     expected: tuple[Expected, ...]
-
-
-@dataclass(slots=True)
-class Drawn:
-    """Answers extern procedures by chance, and keeps what it answered."""
-
-    program: Program
-    random: Random
-    given: list[Answer]
-
-    def answer(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
-        """An edge of each leaf that is written, or a reading outside its range."""
-        leaves = [self.program.variable(name) for name in procedure.writes]
-        values = tuple(self.random.choice(results(self.program, leaf)) for leaf in leaves)
-        self.given.append(Answer(str(procedure.name), values))
-        return values
 
 
 def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]:
@@ -105,11 +88,11 @@ def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]
             if variable.kind is not Kind.INPUT or isinstance(variable.type, Bool):
                 words = f"{variable.name} {end} its range"
                 yield Case(Entry("check"), {**start, variable.name: value}, origin=words)
-    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    cycles = runs(program)
     unsafe = _unsafe(program)
     for mode in MODES if reals else ():
         yield Case(cycles[-1], unsafe, origin=f"a machine that rounds {mode}", mode=mode)
-    for variable in (v for v in program.variables if v.kind is Kind.INPUT and not isinstance(v.type, Bool)):
+    for variable in (v for v in inputs(program) if not isinstance(v.type, Bool)):
         for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
             for entry in cycles:
                 yield Case(entry, {**unsafe, variable.name: value}, origin=f"{variable.name} {end} its range")
@@ -118,14 +101,14 @@ def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]
 def _at_ends(program: Program) -> Iterator[Case]:
     """Every variable at an end of its range, which is let pass; and reals of -0.0."""
     start = initial(program)
-    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
-    inputs = [v for v in program.variables if v.kind is Kind.INPUT]
+    cycles = runs(program)
+    given_leaves = inputs(program)
     for at, which in enumerate(("least", "greatest")):
         ends: Snapshot = {str(v.name): ends_of(v.type)[at] for v in program.variables}
         yield Case(Entry("check"), ends, origin=f"every variable {which}")
-        given: Snapshot = {**start, **{str(v.name): ends[v.name] for v in inputs}}
+        given: Snapshot = {**start, **{str(v.name): ends[v.name] for v in given_leaves}}
         yield from (Case(entry, given, origin=f"every input {which}") for entry in cycles)
-    zeros = {str(v.name): -0.0 for v in inputs if _has_zero(v.type)}
+    zeros = {str(v.name): -0.0 for v in given_leaves if _has_zero(v.type)}
     for entry in cycles[:1] if zeros else ():
         yield Case(entry, {**start, **zeros}, origin="inputs of -0.0, which is taken as 0.0")
 
@@ -154,12 +137,12 @@ def untrusted(program: Program, refused: Sequence[Case]) -> Iterator[Case]:
         refused: Cases of `check` that it refuses; each is given to some cycle, and each cycle some of them.
     """
     start = _unsafe(program)
-    cycles = [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+    cycles = runs(program)
     for at in range(max(len(refused), len(cycles))):
         case = refused[at % len(refused)]
         yield replace(case, entry=cycles[at % len(cycles)])
-    for variable in program.variables:
-        if variable.kind is Kind.INPUT and isinstance(variable.type, Bool):
+    for variable in inputs(program):
+        if isinstance(variable.type, Bool):
             before = {**start, variable.name: 2}
             yield from (Case(entry, before, origin=f"{variable.name} above its range") for entry in cycles)
 
@@ -302,19 +285,14 @@ def drawn(program: Program, entry: Entry, examples: int, most: int) -> Iterator[
         most: Cycles of the longest.
     """
     known, random = declarations(program), Random(f"{entry.kind} {entry.name}")  # noqa: S311  # repeatable
-    tables = {str(table.name): table for table in program.tables}
     levels = {level.name: level for level in program.levels}
-    aimed = tables[entry.name] if entry.kind == "step" else None
-    left = examples
-    for _ in range(TRIES * examples):
-        table = aimed or tables[str(random.choice(levels[entry.name].table_names))]
-        stimuli = session(known, table, most, random)
-        if refused_at(program, stimuli.start) >= 0:
-            continue
-        yield played(program, entry, stimuli, random)
-        left -= 1
-        if not left:
-            return
+
+    def aim() -> Table:
+        name = entry.name if entry.kind == "step" else random.choice(levels[entry.name].table_names)
+        return program.table(name)
+
+    drawn = sessions(known, aim, most, random, examples, lambda start: refused_at(program, start) < 0)
+    yield from (played(program, entry, stimuli, random) for stimuli in drawn)
 
 
 def played(program: Program, entry: Entry, stimuli: Stimuli, random: Random) -> Session:
@@ -323,12 +301,27 @@ def played(program: Program, entry: Entry, stimuli: Stimuli, random: Random) -> 
     state: Snapshot = stimuli.start
     for number, readings in enumerate(stimuli.readings, 1):
         before = {**state, **readings}
-        answers = Drawn(program, random, [])
-        with_answers = Case(entry, before, origin=f"drawn, cycle {number}")
-        right = ran(program, with_answers, answers.answer)
+        given: list[Answer] = []
+        bare = Case(entry, before, origin=f"drawn, cycle {number}")
+        right = ran(program, bare, _answering(program, random, given))
         if right is None or right.after is None:
             break
-        cases.append(Case(entry, before, tuple(answers.given), with_answers.origin))
+        cases.append(replace(bare, answers=tuple(given)))
         shown.append(right)
         state = right.after
     return Session(entry, tuple(cases), tuple(shown))
+
+
+def _answering(program: Program, random: Random, given: list[Answer]) -> Answers:
+    """Return what answers extern procedures by chance, and keeps what it answered.
+
+    An answer is an edge of each leaf that is written, or a reading outside its range.
+    """
+
+    def answer(procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        leaves = (program.variable(name) for name in procedure.writes)
+        values = tuple(random.choice(results(program, leaf)) for leaf in leaves)
+        given.append(Answer(str(procedure.name), values))
+        return values
+
+    return answer

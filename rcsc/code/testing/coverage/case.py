@@ -8,8 +8,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rcsc.code.testing.agree import line_number
+from rcsc.code.emit.code_tree import type_bounds
+from rcsc.code.testing.agree import line_number, seen_by_interpreter
 from rcsc.code.testing.executors.edges import may_be_matched
+from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.interpret import (
     UNDEFINED,
     Answers,
@@ -30,7 +32,6 @@ from rcsc.lang.model import (
     Real,
     Scalar,
     Snapshot,
-    Table,
     Value,
     Variable,
     key_bounds,
@@ -113,6 +114,28 @@ def entries(program: Program) -> tuple[Entry, ...]:
     return (Entry("init"), Entry("check"), *kinds, *(Entry("cycle", level.name) for level in program.levels))
 
 
+def runs(program: Program) -> list[Entry]:
+    """Return the functions that run a cycle: steps of tables, and cycles of levels."""
+    return [entry for entry in entries(program) if entry.kind in ("step", "cycle")]
+
+
+def function_of(symbols: Symbols, entry: Entry) -> str:
+    """Return the name of an entry's function in the C."""
+    match entry.kind:
+        case "init":
+            return symbols.init
+        case "check":
+            return symbols.check
+        case "cycle":
+            return symbols.cycles[entry.name]
+    functions: Mapping[str, Mapping[str, str]] = {
+        "line": symbols.lines,
+        "lines": symbols.batches,
+        "step": symbols.steps,
+    }
+    return functions[entry.kind][entry.name]
+
+
 def expected(program: Program, case: Case, *, defensive: bool = False) -> Expected | None:
     """What the language says; None where it says nothing: the state may not be gone on from, or a table not be matched.
 
@@ -127,7 +150,7 @@ def expected(program: Program, case: Case, *, defensive: bool = False) -> Expect
         case "check":
             return Expected(checked(program, case, defensive=defensive))
         case "line" | "lines":
-            table = table_of(program, case.entry)
+            table = program.table(case.entry.name)
             if not may_be_matched(program, table, case.before):
                 return None
             return Expected(line_number(table, matching_lines(table, case.before)))
@@ -164,23 +187,16 @@ def ran(program: Program, case: Case, answers: Answers | None = None) -> Expecte
     try:
         with answering(answers or (lambda _procedure, _args: next(given))):
             if case.entry.kind == "step":
-                return _told(run_table(program, table_of(program, case.entry), case.before))
+                return _told(run_table(program, program.table(case.entry.name), case.before))
             level = next(level for level in program.levels if level.name == case.entry.name)
             return _told(cycle(program, level, case.before))
     except (*UNDEFINED, StopIteration):
         return None
 
 
-def table_of(program: Program, entry: Entry) -> Table:
-    """The table of an entry that has one."""
-    return next(table for table in program.tables if table.name == entry.name)
-
-
 def _told(outcome: Outcome) -> Expected:
-    ran = outcome.fault in (Fault.OK, Fault.EXTERN) and outcome.line is not None
-    failed = tuple(str(name) for name in outcome.failed_assumptions)
-    line = outcome.line_index if ran else NONE
-    return Expected(int(outcome.fault), str(outcome.fault_at), line, failed, outcome.snapshot)
+    seen = seen_by_interpreter(outcome)
+    return Expected(seen.fault, seen.fault_at, seen.line, seen.failed, seen.snapshot)
 
 
 def refused_at(program: Program, state: Snapshot, *, defensive: bool = False) -> int:
@@ -224,7 +240,6 @@ def outside_of(variable: Variable, c_type: str) -> Mapping[str, Value]:
             "nan": math.nan,
         }
     low, high = (kind.low, kind.high) if isinstance(kind, Int) else key_bounds(kind)
-    bits = int(c_type.strip("uint_"))
-    least, most = (0, 2**bits - 1) if c_type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    least, most = type_bounds(c_type)
     beyond = {"below": low - 1, "above": high + 1}
     return {end: value for end, value in beyond.items() if least <= value <= most}

@@ -1,10 +1,11 @@
 """The cases that are kept: each hits something that none before it does, and none can be spared.
 
-In: cases. Out: vectors, with what each must give, and the sessions that were drawn on the way.
+In: cases. Out: vectors, with what each must give and which lines it takes, and the sessions that were drawn on the way.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias, cast
 
 from rcsc.code.emit.plan import Plan
 from rcsc.code.testing.coverage.candidates import (
@@ -16,16 +17,23 @@ from rcsc.code.testing.coverage.candidates import (
     of_truths,
     refusals,
 )
-from rcsc.code.testing.coverage.case import Case, Entry, Expected, entries, expected
+from rcsc.code.testing.coverage.case import Case, Entry, Expected, expected, ran, runs
 from rcsc.code.testing.coverage.goals import Hit, Reached
 from rcsc.code.testing.coverage.marks import marked
+from rcsc.code.testing.executors.reference_file import all_lines
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.inputs.snapshot import InputSearch
 from rcsc.code.testing.inputs.vectors import Vectors
-from rcsc.lang.model import Program
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Action, Apply, Bool, Default, Line, Literal, Local, Program, Table
+from rcsc.lang.operator_table import Operator
 
 LEAVE_AFTER = 60
 """Sessions of one function in which nothing new is hit, after which no more are drawn."""
+MOST_CYCLES = 8
+"""Of a drawn session."""
+TakenLine: TypeAlias = tuple[str, str]
+"""A table and the name of one of its lines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,15 +133,61 @@ def chosen(
     for case, bits in of_masks(plan, tables):
         if not choice.reached.hits.issuperset(bits):
             choice.offer(case)
-    for entry in entries(program):
-        if entry.kind in ("step", "cycle"):
-            progress(f"drawing sessions of {entry.kind} {entry.name}")
-            choice.draw(entry, sessions, MOST_CYCLES)
+    for entry in runs(program):
+        progress(f"drawing sessions of {entry.kind} {entry.name}")
+        choice.draw(entry, sessions, MOST_CYCLES)
     for kept in [kept for kept in choice.kept if kept.case.answers]:
         for case in refusals(program, symbols, kept.case):
             choice.offer(case)
     return choice
 
 
-MOST_CYCLES = 8
-"""Of a drawn session."""
+# --- lines that vectors take ---
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Ran:
+    """A mark at the head of a line; an operator of one truth."""
+
+    line: TakenLine
+    seen: list[TakenLine]
+
+    def meaning(self, truth: bool) -> bool:
+        """Note that the line runs."""
+        self.seen.append(self.line)
+        return truth
+
+
+def taken(program: Program, kept: Sequence[Kept]) -> Iterator[tuple[TakenLine, ...]]:
+    """Give the lines that each vector takes: the one that matches, or all that run.
+
+    The trace of a cycle tells the line of its last table alone, so that a cycle is played again with a mark at the head of each line.
+    """
+    seen: list[TakenLine] = []
+    noting = _noting(program, seen)
+    for each in kept:
+        case, right = each.case, each.expected
+        match case.entry.kind:
+            case "line" | "lines" if right.result >= 0:
+                yield ((case.entry.name, all_lines(program.table(case.entry.name))[right.result][0]),)
+            case "step" | "cycle" if not case.mode and right.result != Fault.STATE:
+                seen.clear()
+                ran(noting, case)
+                yield tuple(seen)
+            case _:
+                yield ()
+
+
+def _noting(program: Program, seen: list[TakenLine]) -> Program:
+    """Return the program with a statement at the head of each line that changes nothing and notes the line."""
+
+    def actions(table: Table, line: Line | Default) -> tuple[Action, ...]:
+        note = cast(Operator, _Ran((str(table.name), str(line.name)), seen))
+        return Action("", "", Local("", Bool(), Apply(note, (Literal(True, Bool()),), Bool()))), *line.actions
+
+    def noted(table: Table) -> Table:
+        lines = tuple(replace(line, actions=actions(table, line)) for line in table.lines)
+        default = table.default and replace(table.default, actions=actions(table, table.default))
+        return replace(table, lines=lines, default=default)
+
+    return replace(program, tables=tuple(map(noted, program.tables)))

@@ -136,11 +136,7 @@ class Followed:
 
 def followed(program: Program, whole: Marked, entry: Entry) -> Followed | None:
     """Follow a function; None where it is too long."""
-    run = Watched(
-        {str(p.name): p for p in whole.program.procedures},
-        {str(v.name): v.type for v in program.variables},
-        {},
-    )
+    run = Watched.of(whole.program, {})
     base: list[Node] = []
     try:
         if entry.kind == "check":
@@ -282,7 +278,7 @@ class Director:
         """Ends of a cycle for want of one line, of tables that can be without when they are run alone."""
         function = self._function(Entry("cycle", level.name))
         for name in map(str, level.table_names):
-            table = next(table for table in self.choice.program.tables if table.name == name)
+            table = self.choice.program.table(name)
             for which, what in ((NONE, "no line matches"), (SEVERAL, "several lines match")):
                 if ("matched", name, which) not in self.choice.reached.hits or (
                     which == NONE and table.default
@@ -313,7 +309,7 @@ class Director:
             yield Unreached(where, what, "true", shown=True, reason=PROVED, key=key)
             return
         program = self.choice.program
-        run = Run({}, {str(v.name): v.type for v in program.variables}, {})
+        run = Run.of(program, {})
         rests = [a.condition for a in program.assumptions if a.name in table.stops]
         given = [run.evaluate(each) for each in (*(i.condition for i in program.invariants), *rests)]
         answer = self.asks([*given, run.evaluate(wanted)])

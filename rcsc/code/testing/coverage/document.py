@@ -13,10 +13,9 @@ from typing import Any
 
 from rcsc.base.host.files import csv_text
 from rcsc.code.testing.coverage.candidates import Session
-from rcsc.code.testing.coverage.case import Case, Entry, Expected
-from rcsc.code.testing.coverage.choose import Kept
+from rcsc.code.testing.coverage.case import Case, Expected, function_of
+from rcsc.code.testing.coverage.choose import Kept, TakenLine, taken
 from rcsc.code.testing.coverage.directed import Unreached
-from rcsc.code.testing.coverage.lines import TakenLine, taken
 from rcsc.code.testing.executors.reference_file import all_lines
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.inputs.vectors import Vectors
@@ -68,29 +67,12 @@ def _changes(program: Program, before: Snapshot, after: Snapshot) -> dict[str, o
     return {name: value for name, value in new.items() if value != old[name]}
 
 
-def function_of(symbols: Symbols, entry: Entry) -> str:
-    """Name of an entry's function in the C."""
-    match entry.kind:
-        case "init":
-            return symbols.init
-        case "check":
-            return symbols.check
-        case "cycle":
-            return symbols.cycles[entry.name]
-    functions: Mapping[str, Mapping[str, str]] = {
-        "line": symbols.lines,
-        "lines": symbols.batches,
-        "step": symbols.steps,
-    }
-    return functions[entry.kind][entry.name]
-
-
 def _line(program: Program, case: Case, right: Expected) -> str:
     """The line that runs or matches, by name; empty for none."""
     at = right.result if case.entry.kind in ("line", "lines") else right.line
     if at < 0 or case.entry.kind not in ("line", "lines", "step"):
         return ""
-    return all_lines(next(table for table in program.tables if table.name == case.entry.name))[at][0]
+    return all_lines(program.table(case.entry.name))[at][0]
 
 
 def expected_of(program: Program, case: Case, right: Expected) -> dict[str, object]:

@@ -14,7 +14,7 @@ from operator import and_
 from typing import TypeAlias
 
 from rcsc.code.emit.plan import Coded, Cuts, Direct, Index, Matcher, Plan, Truth
-from rcsc.code.testing.coverage.case import Case, Expected, ends_of, outside_of, ran, table_of
+from rcsc.code.testing.coverage.case import Case, Expected, ends_of, outside_of, ran
 from rcsc.code.testing.coverage.marks import Decision, Marked, Outcomes
 from rcsc.lang.interpret import Fault, evaluate, holds
 from rcsc.lang.model import (
@@ -27,7 +27,6 @@ from rcsc.lang.model import (
     Program,
     Real,
     Snapshot,
-    Table,
     Value,
     Variable,
     key_bounds,
@@ -101,7 +100,7 @@ class Reached:
                 yield variable.name, before[variable.name]
 
     def _matched(self, case: Case, right: Expected) -> Iterator[Hit]:
-        table = table_of(self.marked.program, case.entry)
+        table = self.marked.program.table(case.entry.name)
         if case.entry.kind == "lines":
             return
         yield ("matched", table.name, min(right.result, 0))
@@ -109,17 +108,12 @@ class Reached:
         for test in {id(t): t for line in table.lines for t in line.tests if t is not None}.values():
             if test.box is None:
                 holds(test.condition, case.before)
-        yield from self._classes(table, case.before)
-        planned = next(one for one in self.plan.tables if one.table.name == table.name)
-        yield from (("bit", table.name, *bit) for bit in bits_of(planned.matcher, case.before))
-
-    def _classes(self, table: Table, before: Snapshot) -> Iterator[Hit]:
-        """The class of each leaf that the C finds by comparing."""
-        planned = next(one for one in self.plan.tables if one.table.name == table.name)
-        for probe in (probe for group in planned.matcher.groups for probe in group):
-            match probe.index:
+        matcher = next(one.matcher for one in self.plan.tables if one.table.name == table.name)
+        for probe in (probe for group in matcher.groups for probe in group):
+            match probe.index:  # the class of each leaf that the C finds by comparing
                 case Direct(leaf=leaf, type=Bool()) | Cuts(leaf=leaf):
-                    yield ("class", table.name, leaf, class_of(probe.index, before))
+                    yield ("class", table.name, leaf, class_of(probe.index, case.before))
+        yield from (("bit", table.name, *bit) for bit in bits_of(matcher, case.before))
 
     def _run(self, case: Case, right: Expected) -> Iterator[Hit]:
         entry, after = case.entry, right.after
@@ -178,8 +172,7 @@ class Reached:
 
     def _told(self, name: str, failed: tuple[str, ...]) -> Iterator[Hit]:
         """How each assumption that the table checks went, and whether one before it had ended the cycle."""
-        table = next(table for table in self.program.tables if table.name == name)
-        ended = False
+        table, ended = self.program.table(name), False
         for at in self.plan.monitored:
             assumption = self.program.assumptions[at].name
             if assumption in table.assumptions:

@@ -5,19 +5,18 @@ that hundreds of vectors take some kilobytes; nothing is allocated. Extern proce
 file defines them.
 """
 
-import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 
-from rcsc.code.testing.coverage.case import MODES, Case, Entry, checked, entries, ran
+from rcsc.code.testing.coverage.case import MODES, NONE, Case, Entry, checked, entries, function_of, ran
 from rcsc.code.testing.coverage.choose import Kept
-from rcsc.code.testing.executors.externs import externs
+from rcsc.code.testing.executors.externs import externs, given_kinds, stand_in_head
+from rcsc.code.testing.executors.native import to_word
 from rcsc.code.testing.executors.reference_file import monitored
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.interpret import Fault, initial
-from rcsc.lang.model import Procedure, Program, Real, Scalar, Snapshot, Value
+from rcsc.lang.model import Procedure, Program, Real, Scalar, Snapshot, TableName, Value
 
-WORD_BITS = 64
+WORD_BITS, EVERY_BIT = 64, 0xFFFF_FFFF_FFFF_FFFF
 
 HEAD = """/* The test vectors of {program}, made by rcsc: {count} of them.
    On a host:      cc -I . vectors.c {source} -o vectors && ./vectors
@@ -159,12 +158,8 @@ int main(void)
 
 
 def word_of(kind: Scalar, value: Value) -> int:
-    """A value as 64 bits: a real as a double, a whole number in two's complement."""
-    if isinstance(kind, Real):
-        bits: int = struct.unpack("<Q", struct.pack("<d", float(value)))[0]
-        return bits
-    number: int = int(value) % 2**WORD_BITS
-    return number
+    """Return a value as 64 bits: a real as a double, a whole number in two's complement."""
+    return to_word(kind, value) & EVERY_BIT
 
 
 def vectors_c(program: Program, symbols: Symbols, kept: Sequence[Kept]) -> str:
@@ -176,9 +171,9 @@ def vectors_c(program: Program, symbols: Symbols, kept: Sequence[Kept]) -> str:
         kept: Its vectors, in order.
     """
     rows, changes = _data(program, kept)
-    failed = symbols.trace.failed_paths
+    failed = symbols.failed
     own = (f"(s.{path} == v->failed[{at}])" for at, path in enumerate(failed))
-    trace = f"((s.fault == v->result) && ({symbols.trace.line('s')} == v->line) && ({symbols.trace.fault_at('s')} == v->fault_at)"
+    trace = "((s.fault == v->result) && (s.line == v->line) && (s.fault_at == v->fault_at)"
     shape = {
         "program": program.name,
         "count": len(kept),
@@ -235,12 +230,11 @@ def _calls(program: Program, symbols: Symbols) -> Iterator[str]:
     yield "static bool called; /* whether extern functions were given what they must be, as often as they must be */\n"
     if externs(program):
         yield TAKEN
-    defined = set[str]()
+    declared: dict[str, Procedure] = {}
     for procedure in externs(program):
-        assert procedure.extern is not None
-        if procedure.extern.c not in defined:
-            defined.add(procedure.extern.c)
-            yield from _stand_in(program, symbols, procedure, procedure.extern.c)
+        declared.setdefault(procedure.extern.c if procedure.extern else "", procedure)
+    for procedure in declared.values():
+        yield from _stand_in(program, symbols, procedure)
     yield f"static int32_t call({symbols.struct} *s, uint16_t function)"
     yield "{\n    int32_t result = 0;\n    switch (function) {"
     for at, entry in enumerate(entries(program)):
@@ -252,29 +246,17 @@ def _calls(program: Program, symbols: Symbols) -> Iterator[str]:
 
 
 def _call(symbols: Symbols, entry: Entry) -> str:
-    match entry.kind:
-        case "init":
-            return f"{symbols.init}(s);"
-        case "check":
-            return f"result = {symbols.check}(s);"
-        case "line":
-            return f"result = {symbols.lines[entry.name]}(s);"
-        case "lines":
-            batch = f"{symbols.batches[entry.name]}(same, got, 2u);"
-            same = f"const {symbols.struct} same[3] = {{*s, *s, *s}}; int32_t got[3] = {{-9, -8, -7}};"
-            return f"{{ {same} {batch} result = ((got[0] == got[1]) && (got[2] == -7)) ? got[0] : -9; }}"
-        case "step":
-            return f"result = {symbols.steps[entry.name]}(s);"
-        case _:
-            return f"result = {symbols.cycles[entry.name]}(s);"
+    function = function_of(symbols, entry)
+    if entry.kind == "lines":
+        same = f"const {symbols.struct} same[3] = {{*s, *s, *s}}; int32_t got[3] = {{-9, -8, -7}};"
+        told = "result = ((got[0] == got[1]) && (got[2] == -7)) ? got[0] : -9;"
+        return f"{{ {same} {function}(same, got, 2u); {told} }}"
+    return f"{function}(s);" if entry.kind == "init" else f"result = {function}(s);"
 
 
-def _stand_in(program: Program, symbols: Symbols, procedure: Procedure, function: str) -> Iterator[str]:
-    types = [symbols.c_type(name) for name in procedure.reads]
-    types += [symbols.value_type(p.type) for p in procedure.params]
-    given = [f"{held} a{at}" for at, held in enumerate(types)]
-    outs = [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
-    yield f"void {function}({', '.join([*given, *outs]) or 'void'})\n{{"
+def _stand_in(program: Program, symbols: Symbols, procedure: Procedure) -> Iterator[str]:
+    head, types = stand_in_head(symbols, procedure)
+    yield f"{head}\n{{"
     for at, held in enumerate(types):
         if held in ("double", "float"):
             yield f"    {{ const double real = (double)a{at}; uint64_t word; memcpy(&word, &real, sizeof word);"
@@ -290,39 +272,24 @@ def _stand_in(program: Program, symbols: Symbols, procedure: Procedure, function
     yield "}\n"
 
 
-@dataclass(slots=True)
-class _Numbers:
-    """Positions by name."""
-
-    entries: Mapping[Entry, int]
-    leaves: Mapping[str, int]
-    assumptions: Sequence[str]
-    tables: Sequence[str]
-
-    def fault_at(self, program: Program, each: Kept) -> int:
-        """What `fault_at` is."""
-        right = each.expected
-        if each.case.entry.kind in ("step", "cycle") and right.result == Fault.STATE:
-            return checked(program, each.case, defensive=True)
-        if not right.fault_at:
-            return -1
-        match right.result:
-            case Fault.ASSUMPTION:
-                return self.assumptions.index(right.fault_at)
-            case Fault.NO_LINE | Fault.SEVERAL_LINES:
-                return self.tables.index(right.fault_at)
-        return self.leaves[right.fault_at]
+def _fault_at(program: Program, each: Kept) -> int:
+    """Return the number that the trace tells as `fault_at`."""
+    right = each.expected
+    if each.case.entry.kind in ("step", "cycle") and right.result == Fault.STATE:
+        return checked(program, each.case, defensive=True)
+    if not right.fault_at:
+        return NONE
+    match right.result:
+        case Fault.ASSUMPTION:
+            return monitored(program).index(right.fault_at)
+        case Fault.NO_LINE | Fault.SEVERAL_LINES:
+            return [table.name for table in program.tables].index(TableName(right.fault_at))
+    return list(program.kinds).index(right.fault_at)
 
 
 def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]:
     """Rows of vectors, and of changes."""
-    numbers = _Numbers(
-        {entry: at for at, entry in enumerate(entries(program))},
-        {str(v.name): at for at, v in enumerate(program.variables)},
-        monitored(program),
-        [str(table.name) for table in program.tables],
-    )
-    start = initial(program)
+    every, assumptions, start = entries(program), monitored(program), initial(program)
     rows, changes = list[str](), list[str]()
     for each in kept:
         first, right = len(changes), each.expected
@@ -332,12 +299,12 @@ def _data(program: Program, kept: Sequence[Kept]) -> tuple[list[str], list[str]]
         answers = [f"{{0u, {_hex(word)}}}" for word in _called(program, each.case)]
         changes += [*sets, *after, *answers]
         mode = ("", *MODES).index(each.case.mode)
-        words = max(1, -(-len(numbers.assumptions) // WORD_BITS))
-        bits = sum(1 << numbers.assumptions.index(name) for name in right.failed)
-        failed = ", ".join(_hex(bits >> WORD_BITS * at & (2**WORD_BITS - 1)) for at in range(words))
-        counts = f"{numbers.entries[each.case.entry]}u, {len(sets)}u, {len(after)}u, {len(answers)}u, {mode}u, {first}u"
+        words = max(1, -(-len(assumptions) // WORD_BITS))
+        bits = sum(1 << assumptions.index(name) for name in right.failed)
+        failed = ", ".join(_hex(bits >> WORD_BITS * at & EVERY_BIT) for at in range(words))
+        counts = f"{every.index(each.case.entry)}u, {len(sets)}u, {len(after)}u, {len(answers)}u, {mode}u, {first}u"
         rows.append(
-            f"    {{{counts}, {right.result}, {right.line}, {numbers.fault_at(program, each)}, {{{failed}}}}}, "
+            f"    {{{counts}, {right.result}, {right.line}, {_fault_at(program, each)}, {{{failed}}}}}, "
             f"/* {each.case.entry.kind} {each.case.entry.name}: {_plain(each.case.origin)} */"
         )
     return rows, changes or ["{0u, 0u}"]
@@ -348,9 +315,10 @@ def _called(program: Program, case: Case) -> list[int]:
     answers, words = iter(case.answers), list[int]()
 
     def answered(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
-        kinds: list[Scalar] = [program.variable(name).type for name in procedure.reads]
-        kinds += [param.type for param in procedure.params]
-        kinds += [program.variable(name).type for name in procedure.writes]
+        kinds = [
+            *given_kinds(program, procedure),
+            *(program.variable(name).type for name in procedure.writes),
+        ]
         given = next(answers).values
         words.extend(map(word_of, kinds, (*args, *given)))
         return given

@@ -6,6 +6,8 @@ In: a program. Out: keys (see `rcsc.lang.model`) and readings outside the declar
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf, nan
 
+from rcsc.code.emit.c.ctext import c_type
+from rcsc.code.emit.code_tree import type_bounds
 from rcsc.lang.interpret import holds
 from rcsc.lang.leaves import everything, expressions, parts, read_by
 from rcsc.lang.model import (
@@ -122,20 +124,6 @@ def companions(program: Program) -> dict[str, tuple[str, ...]]:
     return {name: tuple(sorted(others)) for name, others in compared.items() if others}
 
 
-def representable(kind: Scalar) -> tuple[int, int]:
-    """Return the least and greatest integer of the C type of a leaf of this kind (not for reals).
-
-    Source: the executors' rule, the smallest of the (u)int8 .. 64 types that holds the range.
-    """
-    low, high = key_bounds(kind)
-    for bits in (8, 16, 32, 64):
-        if low >= 0 and high < 1 << bits:
-            return 0, (1 << bits) - 1
-        if low < 0 and -(1 << bits - 1) <= low and high < 1 << bits - 1:
-            return -(1 << bits - 1), (1 << bits - 1) - 1
-    return low, high
-
-
 def outside(kind: Scalar) -> tuple[Value, ...]:
     """Return readings that a C variable of this kind can hold and that lie outside the range."""
     if isinstance(kind, Real):
@@ -145,7 +133,7 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
     if isinstance(kind, Bool):
         return ()
     low, high = key_bounds(kind)
-    least, greatest = representable(kind)
+    least, greatest = type_bounds(c_type(kind))
     strange = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
     return tuple(sorted(k for k in strange if least <= k <= greatest))
 

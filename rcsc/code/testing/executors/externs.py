@@ -51,6 +51,16 @@ def externs(program: Program) -> tuple[Procedure, ...]:
     return tuple(procedure for procedure in program.procedures if procedure.extern is not None)
 
 
+def stand_in_head(symbols: Symbols, procedure: Procedure) -> tuple[str, list[str]]:
+    """Return the head of a C function in place of an extern: `void f(uint8_t a0, bool *r0)`; and the types of what it is given."""
+    given = [symbols.c_type(name) for name in procedure.reads]
+    given += [symbols.value_type(p.type) for p in procedure.params]
+    params = [f"{c_type} a{at}" for at, c_type in enumerate(given)]
+    params += [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
+    function = procedure.extern.c if procedure.extern else ""
+    return f"void {function}({', '.join(params) or 'void'})", given
+
+
 def results(program: Program, variable: Variable) -> tuple[Value, ...]:
     """What a stand-in may give for a leaf: edges, and for every fourth choice a reading outside the range."""
     inside = [value_of_key(variable.type, key) for key in leaf_edges(program)[variable.name]][:MOST_RESULTS]
@@ -207,12 +217,7 @@ def c_stand_ins(program: Program, symbols: Symbols) -> str:
 
 def _c_function(program: Program, symbols: Symbols, procedure: Procedure) -> Iterator[str]:
     kinds = given_kinds(program, procedure)
-    types = [symbols.c_type(name) for name in procedure.reads]
-    types += [symbols.value_type(p.type) for p in procedure.params]
-    given = [f"{c_type} a{at}" for at, c_type in enumerate(types)]
-    taken = [f"{symbols.c_type(name)} *r{at}" for at, name in enumerate(procedure.writes)]
-    function = procedure.extern.c if procedure.extern else ""
-    yield f"void {function}({', '.join([*given, *taken]) or 'void'}) {{"
+    yield f"{stand_in_head(symbols, procedure)[0]} {{"
     for salt, name in enumerate(procedure.writes):
         variable = program.variable(name)
         yield f"uint32_t h{salt} = ({SEED ^ salt}u ^ rcsc_script) * {FACTOR}u;"

@@ -66,7 +66,7 @@ class PythonUnderTest:
 
     def seen(self, fault: int, state: Any) -> Seen:
         """The state after a cycle in the common words."""
-        words = [getattr(state, word) for word in self.symbols.trace.failed_paths]
+        words = [getattr(state, word) for word in self.symbols.failed]
         names = enumerate(monitored(self.program))
         failed = tuple(name for at, name in names if words[at // 64] >> at % 64 & 1)
         at = fault_named(self.program, self.symbols, fault, state.fault_at)

@@ -11,6 +11,7 @@ from rcsc.code.testing.executors.edges import relational_tests
 from rcsc.code.testing.executors.reference import Writer, constant, outside_tests, refusal, settling
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.lang.interpret import Fault
+from rcsc.lang.meaning import checked
 from rcsc.lang.model import (
     Kind,
     Level,
@@ -127,17 +128,12 @@ def _actions(writer: Writer, number: int, table: Table) -> Iterator[str]:
 
 def all_lines(table: Table) -> list[tuple[str, tuple[Statement, ...]]]:
     """Name and statements of every line, DEFAULT last."""
-    lines = [(str(line.name), tuple(a.statement for a in line.actions)) for line in table.lines]
-    if table.default is not None:
-        lines.append((str(table.default.name), tuple(a.statement for a in table.default.actions)))
-    return lines
+    return [(str(line.name), tuple(a.statement for a in line.actions)) for line in table.every_line]
 
 
 def monitored(program: Program) -> tuple[str, ...]:
     """Names of the assumptions that the executors check, in order."""
-    stopping = {name for table in program.tables for name in table.stops}
-    checked = (a for a in program.assumptions if a.standing.checked or a.name in stopping)
-    return tuple(str(a.name) for a in checked)
+    return tuple(str(program.assumptions[at].name) for at in checked(program))
 
 
 def fault_named(program: Program, symbols: Symbols, fault: int, at: int) -> str:

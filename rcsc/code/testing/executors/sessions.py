@@ -5,8 +5,8 @@ compared, and the difference of two in words.
 """
 
 from dataclasses import dataclass, field
+from math import copysign, isnan
 
-from rcsc.code.testing.executors.equality import same_value
 from rcsc.lang.model import Program, Snapshot, Value, spell
 
 MOST_DIFFERENCES = 6
@@ -41,6 +41,14 @@ class Seen:
     line: int
     failed: tuple[str, ...]
     snapshot: Snapshot = field(hash=False)
+
+
+def same_value(value: Value, other: Value) -> bool:
+    """Whether two values of one leaf are the same: the same number with the same sign; any NaN is the same as any NaN."""
+    if isinstance(value, float) or isinstance(other, float):
+        a, b = float(value), float(other)
+        return (isnan(a) and isnan(b)) or (a == b and copysign(1.0, a) == copysign(1.0, b))
+    return int(value) == int(other)
 
 
 def differences(program: Program, expected: Seen, seen: Seen) -> tuple[str, ...]:

@@ -76,14 +76,13 @@ def _copy(program: Program, symbols: Symbols) -> Iterator[str]:
 
 
 def _executor(program: Program, symbols: Symbols, target: ComparedFunction) -> Iterator[str]:
-    trace = symbols.trace
     yield from call_of(symbols, target, "s")
     yield "out[0] = result; out[1] = result;"
     if target.kind in ("step", "cycle"):
-        yield f"out[2] = (out[1] != 0) ? (int64_t){trace.fault_at('(*s)')} : -1;"
-        yield f"out[3] = {trace.line('(*s)')};"
+        yield "out[2] = (out[1] != 0) ? (int64_t)s->fault_at : -1;"
+        yield "out[3] = s->line;"
         for at, _ in enumerate(monitored(program)):
-            yield f"out[{TRACE_WORDS + at}] = {trace.failed('(*s)', at)} ? 1 : 0;"
+            yield f"out[{TRACE_WORDS + at}] = {symbols.failed_bit('(*s)', at)} ? 1 : 0;"
 
 
 def _reference(program: Program, target: ComparedFunction) -> Iterator[str]:

@@ -4,7 +4,7 @@ In: the text of `<program>.json`. Out: names of files, functions and leaves, in 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,30 +28,6 @@ class LeafSymbol:
 
 
 @dataclass(frozen=True, slots=True)
-class TracePlaces:
-    """The places of the trace in the struct; `who` is a C expression of the struct."""
-
-    failed_paths: tuple[str, ...] = ("assumptions_failed",)
-
-    def line(self, who: str) -> str:
-        """The line taken."""
-        return f"{who}.line"
-
-    def fault_at(self, who: str) -> str:
-        """The leaf that was refused."""
-        return f"{who}.fault_at"
-
-    def clear(self, who: str) -> str:
-        """Statements that make the trace what it is before a cycle."""
-        zeros = "".join(f" {who}.{path} = 0;" for path in self.failed_paths)
-        return f"{self.line(who)} = -1; {who}.fault = 0; {self.fault_at(who)} = -1;{zeros}"
-
-    def failed(self, who: str, number: int) -> str:
-        """Whether monitored assumption `number` failed."""
-        return f"((({who}.{self.failed_paths[number // 64]}) >> {number % 64}) & 1u)"
-
-
-@dataclass(frozen=True, slots=True)
 class Symbols:
     """Every name that the suite uses.
 
@@ -61,11 +37,11 @@ class Symbols:
         steps: By table: function of one step.
         batches: By table: function for many inputs.
         cycles: By level: function of one cycle.
-        positions: Of each leaf; what `fault_at` says when it is refused.
         module: File name of the Python executor.
-        digest: What a state of these tables has as its `digest`.
-        check: Function that says whether a state may be gone on from.
         state_class: Its class.
+        check: Function that says whether a state may be gone on from.
+        digest: What a state of these tables has as its `digest`.
+        failed: Members of the struct with a bit for each assumption that is checked and failed, 64 in each.
     """
 
     program: str
@@ -78,12 +54,11 @@ class Symbols:
     steps: Mapping[str, str]
     batches: Mapping[str, str]
     cycles: Mapping[str, str]
-    positions: Mapping[str, int] = field(default_factory=dict)
-    trace: TracePlaces = TracePlaces()
-    module: str = ""
-    state_class: str = ""
-    check: str = ""
-    digest: int = 0
+    module: str
+    state_class: str
+    check: str
+    digest: int
+    failed: tuple[str, ...]
 
     def path(self, name: str) -> str:
         """Place of a leaf in the struct."""
@@ -95,7 +70,7 @@ class Symbols:
 
     def fault_at(self, name: str) -> int:
         """What `fault_at` says when this leaf is refused."""
-        return self.positions[name]
+        return list(self.leaves).index(name)
 
     def value_type(self, kind: Scalar) -> str:
         """C type of a parameter of this kind."""
@@ -108,7 +83,11 @@ class Symbols:
 
     def leaf_at(self, number: int) -> str:
         """The leaf that `fault_at` means."""
-        return next((name for name, at in self.positions.items() if at == number), f"leaf {number}")
+        return dict(enumerate(self.leaves)).get(number, f"leaf {number}")
+
+    def failed_bit(self, who: str, number: int) -> str:
+        """C of whether monitored assumption `number` failed; `who` is a C expression of the struct."""
+        return f"((({who}.{self.failed[number // 64]}) >> {number % 64}) & 1u)"
 
 
 def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
@@ -148,10 +127,9 @@ def _symbols(document: Mapping[str, Any]) -> Symbols:
         steps={x["name"]: x["step"] for x in tables},
         batches={x["name"]: x["lines_of_many"] for x in tables},
         cycles={x["name"]: x["cycle"] for x in document["levels"]},
-        positions={name: at for at, name in enumerate(leaves)},
         module=document["python"]["module"],
         state_class=document["python"]["class"],
         check=document["check"],
         digest=document["digest"]["state"],
-        trace=TracePlaces(failed_paths=tuple(document.get("failed", TracePlaces().failed_paths))),
+        failed=tuple(document.get("failed", ("assumptions_failed",))),
     )

@@ -3,18 +3,19 @@
 In: a program, and a generator of random numbers: the same seed gives the same. Out: snapshots and sessions.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from random import Random
 
 from rcsc.code.testing.executors.edges import companions, leaf_edges, outside
-from rcsc.code.testing.executors.reference_file import monitored
+from rcsc.code.testing.executors.reference_file import inputs, monitored
 from rcsc.code.testing.executors.sessions import Stimuli
 from rcsc.lang.interpret import evaluate
 from rcsc.lang.interval_sets import holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Expr,
-    Kind,
     Line,
     Program,
     Snapshot,
@@ -32,6 +33,7 @@ BESIDE = 0.4  # how often a value is taken from a leaf that it is compared with
 WILD = 1 / 3  # how often readings of a session may lie outside their ranges
 STEADY = 0.3  # how often a cycle reads what the cycle before it read, but for some inputs
 MOST_CHANGED = 3  # inputs that change in a steady cycle
+DRAWN_FOR_ONE = 10  # sessions that are drawn for each that begins where a cycle may, at most
 STRANGE = (0, 0, 1, 2)  # how many inputs of a cycle lie outside their ranges
 
 
@@ -58,14 +60,13 @@ class Declarations:
 
 def declarations(program: Program) -> Declarations:
     """Edges of every leaf, what it is compared with, and what its type holds beyond its range."""
-    inputs = [v for v in program.variables if v.kind is Kind.INPUT]
-    names = set(monitored(program))
+    admitted, names = inputs(program), set(monitored(program))
     return Declarations(
         program,
         leaf_edges(program),
         companions(program),
-        tuple(str(v.name) for v in inputs),
-        {str(v.name): beyond for v in inputs if (beyond := outside(v.type))},
+        tuple(str(v.name) for v in admitted),
+        {str(v.name): beyond for v in admitted if (beyond := outside(v.type))},
         tuple(
             (a.condition, tuple(v for v in program.variables if v.name in set(read_by(a.condition))))
             for a in program.assumptions
@@ -148,3 +149,25 @@ def session(known: Declarations, table: Table | None, most: int, random: Random)
     for _ in range(random.randint(1, most)):
         cycles.append(_readings(known, table, random, cycles[-1] if cycles else {}, wild))
     return Stimuli(start, tuple(cycles))
+
+
+def sessions(
+    known: Declarations,
+    aim: Callable[[], Table | None],
+    most: int,
+    random: Random,
+    examples: int,
+    begins: Callable[[Snapshot], bool],
+) -> Iterator[Stimuli]:
+    """Yield sessions that begin where a cycle may.
+
+    Args:
+        known: Of the program.
+        aim: Gives the table whose lines the next session aims at.
+        most: Cycles of the longest.
+        random: Draws them.
+        examples: How many; fewer where too few of those drawn begin so.
+        begins: Whether a cycle may begin in a state.
+    """
+    drawn = (session(known, aim(), most, random) for _ in range(DRAWN_FOR_ONE * examples))
+    yield from islice((stimuli for stimuli in drawn if begins(stimuli.start)), examples)
