@@ -10,8 +10,7 @@ import pytest
 from rcsc.views.evidence.misra.compliance import Compliance, Summary, collect, main, summary
 from rcsc.views.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
 from rcsc.views.evidence.misra.deviations import explained, own_findings
-from rcsc.views.evidence.misra.guidelines import Category, guidelines
-from rcsc.views.evidence.misra.words import RULES
+from rcsc.views.evidence.misra.guidelines import RULES, Category, guidelines
 from tests.evidence.subjects import EVERYTHING, subject_of
 
 REPO = Path(__file__).parents[2]

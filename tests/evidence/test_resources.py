@@ -15,7 +15,7 @@ from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.views.evidence import resources
-from rcsc.views.evidence.processors.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
+from rcsc.views.evidence.assembly import Bounds, UnboundedError, of_compiler, of_disassembly
 from rcsc.views.evidence.resources import Need, measure
 from tests.evidence.subjects import EVERYTHING, subject_of
 

@@ -15,9 +15,9 @@ from rcsc.front.commands import run
 from rcsc.proof.solvers.options import Options
 from rcsc.views.evidence import analysers, runtime
 from rcsc.views.evidence import collect as collecting
+from rcsc.views.evidence import whole as kinds
 from rcsc.views.evidence.kind import Evidence, Kind
-from rcsc.views.evidence.whole import kinds
-from rcsc.views.evidence.whole.kinds import Whole
+from rcsc.views.evidence.whole import Whole
 
 REPO = Path(__file__).parents[2]
 DOCK, PAPER = REPO / "tests/data/dock/system.toml", REPO / "tables/system.toml"

@@ -18,10 +18,11 @@ from pathlib import Path
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files import csv_text
 from rcsc.base.host.tools import ending, run_command, version_of, write_c
+from rcsc.code.emit.code_tree import type_bounds
+from rcsc.code.testing.executors.externs import externs, stand_in_head
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
+from rcsc.lang.model import Bool, Program, Real, Scalar, key_bounds
 from rcsc.lang.model import Kind as Role
-from rcsc.lang.model import Program, Real, Scalar
-from rcsc.views.evidence.harness import bounds, calls, stand_ins
 from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject, versions_of
 
 TIMEOUT_S = 900.0
@@ -251,6 +252,49 @@ def _overflow(told: str) -> str:
     return "unsigned-integer-overflow" if told.startswith("unsigned") else "signed-integer-overflow"
 
 
+# --- C that calls every function -------------------------------------------------------------
+
+
+def calls(symbols: Symbols, *, defensive: bool) -> Iterator[str]:
+    """Yield a call of every function; `any` makes a state, `admitted` one with inputs within their ranges."""
+    check = f"{symbols.program}_check(&s)"
+    yield f"any(); {symbols.init}(&s);"
+    yield f"any(); (void){check};"
+    for function in (*symbols.steps.values(), *symbols.cycles.values()):
+        call = f"(void){function}(&s);"
+        yield f"any(); {call}" if defensive else f"any(); if ({check} < 0) {{ {call} }}"
+    for name, function in symbols.lines.items():
+        many = f"int32_t at[1]; {symbols.batches[name]}(&s, at, 1u);"
+        yield f"admitted(); if ({check} < 0) {{ (void){function}(&s); {many} }}"
+
+
+def stand_ins(program: Program, symbols: Symbols, value: Callable[[str, Scalar, bool], str]) -> Iterator[str]:
+    """Yield C functions in place of the user's, which give any value of their types.
+
+    Args:
+        program: The program.
+        symbols: Of its C.
+        value: An expression of a value of a C type and a kind: any within the kind's range, or any of the C type where asked.
+    """
+    for procedure in externs(program):
+        head, given = stand_in_head(symbols, procedure)
+        unread = " ".join(f"(void)a{at};" for at, _ in enumerate(given))
+        written = " ".join(
+            f"*r{at} = {value(symbols.c_type(name), program.variable(name).type, True)};"
+            for at, name in enumerate(procedure.writes)
+        )
+        yield f"{head} {{ {unread} {written} }}"
+
+
+def bounds(c_type: str, kind: Scalar, *, whole: bool) -> tuple[int, int]:
+    """Return the bounds of a kind that is no real, or of its C type."""
+    if isinstance(kind, Bool):
+        return 0, 1
+    if not whole and not isinstance(kind, Real):
+        return key_bounds(kind)
+    return type_bounds(c_type)
+
+
 def drawn(program: Program, symbols: Symbols, *, defensive: bool) -> str:
     """Return C that calls every function with drawn states: within their ranges and at their ends, and some inputs outside."""
     lines = [f"static {symbols.struct} s;", *stand_ins(program, symbols, drawn_value)]
@@ -331,6 +375,9 @@ def _constant(value: int) -> str:
     if value >= 0:
         return f"UINT64_C({value})"
     return f"INT64_C({value})" if value > -(1 << 63) else "INT64_MIN"
+
+
+# --- what is told ----------------------------------------------------------------------------
 
 
 def _figures(reports: list[Report]) -> Iterator[str]:

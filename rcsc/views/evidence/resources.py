@@ -2,7 +2,7 @@
 
 In: a program and its C. Out: for each processor and function, what an image of that function alone takes; the stack that its
 longest chain of calls takes; the most instructions that a call took, over drawn sessions on an emulated processor; and the
-instructions of its longest path, where the assembly tells one (`processors.assembly`).
+instructions of its longest path, where the assembly tells one (`assembly`).
 
 The sessions begin in the initial state or in drawn states that `check` accepts, and go on with drawn inputs; besides, each table
 meets combinations of the values of its own test variables. Values are ends of ranges, constants and their neighbours.
@@ -23,14 +23,8 @@ from rcsc.code.testing.executors.externs import STAND_INS, c_stand_ins, externs
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import Kind as VariableKind
 from rcsc.lang.model import Program
+from rcsc.views.evidence.assembly import Assembly, Bounds, UnboundedError, of_compiler, of_disassembly
 from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject, versions_of
-from rcsc.views.evidence.processors.assembly import (
-    Assembly,
-    Bounds,
-    UnboundedError,
-    of_compiler,
-    of_disassembly,
-)
 
 SESSIONS, CYCLES = 64, 12
 """Drawn sessions, and the cycles in each."""

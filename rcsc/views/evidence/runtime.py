@@ -33,7 +33,7 @@ from rcsc.base.host.tools import ending, run_command, write_c
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import I64_MAX, Program, Real, Scalar
 from rcsc.lang.model import Kind as Role
-from rcsc.views.evidence.harness import bounds, calls, stand_ins
+from rcsc.views.evidence.analysers import bounds, calls, stand_ins
 from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject
 
 PACKAGE = "frama-c-base"

@@ -9,9 +9,8 @@ from rcsc.driver.settings import CodeWanted
 from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
 from rcsc.front.commands.shared.show import Output, finish
 from rcsc.proof.solvers.options import Options
-from rcsc.views.evidence.collect import collect
+from rcsc.views.evidence.collect import KINDS, collect
 from rcsc.views.evidence.dossier import EPOCH, RECORD, held, today, user
-from rcsc.views.evidence.kinds import KINDS
 
 _KINDS = "\n".join(f"  {name:<12} {kind.summary}" for name, kind in KINDS.items())
 

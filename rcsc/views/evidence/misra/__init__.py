@@ -13,6 +13,6 @@ deviations elsewhere is a violation until somebody explains it.
 
 Trusted: cppcheck and its add-on, whose own list says which rules they look at. What it costs: some ten seconds a program.
 
-Modules: `guidelines` (numbers and categories), `cppcheck` (the checker), `words` (what the checked
-rules are about), `deviations` (places and reasons), `compliance` (the table).
+Modules: `guidelines` (numbers, categories, what the checked rules are about), `cppcheck` (the checker),
+`deviations` (places and reasons), `compliance` (the table).
 """

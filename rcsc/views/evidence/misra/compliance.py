@@ -25,8 +25,7 @@ from rcsc.views.evidence.misra.cppcheck import (
     installed,
 )
 from rcsc.views.evidence.misra.deviations import Deviation, explained, own_findings
-from rcsc.views.evidence.misra.guidelines import Category, Guideline, guidelines
-from rcsc.views.evidence.misra.words import RULES
+from rcsc.views.evidence.misra.guidelines import RULES, Category, Guideline, guidelines
 
 ELSEWHERE: Mapping[str, str] = {
     "Dir 2.1": "`rcsc evidence --only analysers` compiles it with every warning", "1.1": "`rcsc evidence --only analysers`",

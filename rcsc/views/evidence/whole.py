@@ -1,6 +1,11 @@
 """What each kind of evidence shows of the C of a whole system, or why it does not look at it.
 
-In: a linked system and its files. Out: evidence, as of a program.
+In: a linked system and all files that `rcsc compile` writes of it. Out: evidence, as of a program; the levels' own C has its
+evidence program by program.
+
+The C is played by drawn sessions, for sanitizers and for counting what was reached: outside gives any values, mostly in their ranges;
+the user's functions answer anything of their types; levels start again and go on from copies, some of them spoilt. What a step must
+give is compared by `rcsc test`, beside the Python system.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -11,15 +16,15 @@ from rcsc.base.host.files import csv_text
 from rcsc.base.host.tools import Absent, BuildFailed
 from rcsc.code.testing.coverage.case import outside_of
 from rcsc.driver.settings import silent
-from rcsc.lang.model import Bool
+from rcsc.lang.model import Array, Bool
 from rcsc.run.adopt import Copied, Numbered, adoption
 from rcsc.run.link import Linked
+from rcsc.run.link.wiring import End, LinkedLevel, Question
 from rcsc.views.evidence import analysers
 from rcsc.views.evidence.kind import Evidence, Shortfall
 from rcsc.views.evidence.llvm import Measured, Point, measured, tools
 from rcsc.views.evidence.misra import compliance
 from rcsc.views.evidence.out_of_reach import Missed
-from rcsc.views.evidence.whole.drawn import drawn_system
 
 STEPS = 40_000
 """Steps of the drawn sessions: twice what reaches the last branch of the paper's system."""
@@ -136,3 +141,79 @@ PASSES: Mapping[str, str] = MappingProxyType(
     }
 )
 """Kinds that do not look at the C of a system, and why not."""
+
+
+# --- drawn sessions --------------------------------------------------------------------------
+
+SESSION = 400
+"""Steps after which the system begins anew."""
+
+
+def drawn_system(system: Linked, calls: int) -> str:
+    """Return the file.
+
+    Args:
+        system: The system.
+        calls: The number of steps.
+    """
+    p = system.word
+    lines = [f"static {p}_t s, copy;"]
+    for question in {
+        question.function: question for level in system.levels for question in level.questions
+    }.values():
+        lines += _answer(question)
+    lines += ["static void outside(void) {"]
+    for buffer in system.buffers:
+        if buffer.source is None and buffer.target is not None:
+            lines += ["    if (next() % 2u == 0u) {"]
+            lines += (f"        {each}" for each in _values(buffer.target, f"s.{buffer.place}"))
+            lines += ["    }"]
+    lines += [
+        "}",
+        "static void fail(void) { /* memory that fails: what one level gives another is anything */",
+    ]
+    for buffer in system.buffers:
+        if buffer.source is not None and buffer.target is not None:
+            lines += ["    if (next() % 16u == 0u) {"]
+            lines += (f"        {each}" for each in _values(buffer.target, f"s.{buffer.place}"))
+            lines += ["    }"]
+    lines += ["}", "static void spoil(uint64_t level) {", "    switch (level) {"]
+    lines += (f"    case {at}: {_spoilt(level)} break;" for at, level in enumerate(system.levels, 1))
+    lines += ["    default: break;", "    }", "}"]
+    level = f"({p}_level_t)(next() % {len(system.levels) + 2}u)"
+    body = [
+        f"        if (n % {SESSION}u == 0u) {{ {p}_init(&s); copy = s; }}",
+        "        outside();",
+        "        if (next() % 16u == 0u) { fail(); }",
+        f"        if (next() % 8u == 0u) {{ (void){p}_restart(&s, {level}); }}",
+        "        if (next() % 8u == 0u) {",
+        f"            const {p}_level_t level = {level};",
+        "            if (next() % 4u == 0u) { spoil(level); }",
+        f"            (void){p}_resume(&s, level, &copy);",
+        "        }",
+        "        if (next() % 16u == 0u) { copy = s; }",
+        f"        (void){p}_step(&s);",
+    ]
+    return analysers.player(f"{p}.h", lines, body, calls)
+
+
+def _values(end: End, place: str) -> Iterator[str]:
+    """Yield statements that draw each leaf of a place; one in sixteen from its whole type."""
+    for at in end.run:
+        leaf, kind = end.program.sign.leaves[at], end.program.plan.program.variables[at].type
+        inside, any_ = (analysers.drawn_value(leaf.c_type, kind, whole) for whole in (False, True))
+        yield f"{place}{end.part(at)} = (next() % 16u == 0u) ? ({any_}) : ({inside});"
+
+
+def _answer(question: Question) -> Iterator[str]:
+    """Yield a function in place of the user's, which the system asks."""
+    yield f"{question.head} {{"
+    yield from (f"    (void)key_{at};" for at, _ in enumerate(question.keys))
+    place = "answer" if isinstance(question.into.kind, Array) else "(*answer)"
+    yield from (f"    {each}" for each in _values(question.into, place))
+    yield "}"
+
+
+def _spoilt(level: LinkedLevel) -> str:
+    """Return a statement that spoils the copy's state of a level, so that nothing can go on from it."""
+    return f"copy.{level.member}.digest ^= 1u;"
