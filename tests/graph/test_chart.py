@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rcsc.proof.solvers.options import Options
 from rcsc.views.graph.chart import MOST_LETTERS, MOST_TEXTS, Sheet, SheetBox, sheet
-from rcsc.views.graph.composites import Chart, collapsed, folded, unfolded
+from rcsc.views.graph.composites import Chart, collapsed, folded
 from rcsc.views.graph.derive import Derived, derive
 from rcsc.views.graph.drawing import settled
 from rcsc.views.graph.find import NotFound, tables
@@ -85,15 +85,27 @@ def check(placed: Sheet) -> None:
             assert len(row.texts) <= 3 * MOST_TEXTS
     for frame in placed.frames:
         for box in (*placed.boxes, *placed.headings):
-            within = frame.holds(box.corner) and frame.holds(
-                (box.corner[0] + box.width_px, box.corner[1] + box.height_px)
-            )
-            assert within == (
+            low = box.corner[0] + box.width_px, box.corner[1] + box.height_px
+            assert (holds(frame, box.corner) and holds(frame, low)) == (
                 box.kind in ("state", "shut", "open") and set(box.states) <= set(frame.states)
             ), (
                 frame.name,
                 box.name,
             )
+
+
+def holds(box: SheetBox, point: Point, inset_px: float = 0.0) -> bool:
+    """Whether a point lies in a box, at least so far from its border."""
+    x, y = point[0] - box.corner[0], point[1] - box.corner[1]
+    return inset_px <= x <= box.width_px - inset_px and inset_px <= y <= box.height_px - inset_px
+
+
+def unfolded(chart: Chart) -> frozenset[Edge]:
+    """The edges of a chart, each as its graph has it, settled."""
+    rows = [row for arrow in chart.arrows for row in arrow.rows]
+    rows += [row for each in chart.composites for row in each.stays]
+    rows += [row for each in chart.stays.values() for row in each]
+    return frozenset(edge for row in rows for edge in row.edges)
 
 
 def shown(placed: Sheet) -> set[str]:

@@ -30,13 +30,12 @@ from rcsc.proof.relation.steps import Steps
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver, Term
-from rcsc.views.graph.derive import Derived, derive
+from rcsc.views.graph.derive import Derived, derive, derive_lines
 from rcsc.views.graph.drawing import plain, svg
 from rcsc.views.graph.find import FoundTable, NotFound, tables
 from rcsc.views.graph.formats.choice import FORMS, form_of
 from rcsc.views.graph.formats.reading import UnreadableError, diagnosed
 from rcsc.views.graph.formats.state_graph import ANY, StateGraph
-from rcsc.views.graph.lines import derive_lines
 from rcsc.views.graph.round_trip import Against, against, in_place
 from rcsc.views.graph.to_table import tabled
 from tests.support.programs.stages import program_of

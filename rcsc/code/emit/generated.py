@@ -39,6 +39,17 @@ def write(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
     return ()
 
 
+def written(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
+    """Write files below a folder, whatever is there; yield a diagnostic for each that the operating system refuses."""
+    for name, text in files.items():
+        try:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(folder / name, text.encode())
+        except OSError as error:
+            message = f"`{folder / name}`: cannot be written: {error.strerror}"
+            yield Diagnostic(Code.NOT_WRITTEN, message, Label(Span(str(folder), 0, 0)))
+
+
 def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
     """Return a diagnostic for each file under `folder` that is missing or differs."""
     return lying(files, folder)[1]

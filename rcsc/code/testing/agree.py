@@ -52,7 +52,6 @@ class AgreementCount:
     """What was compared so far.
 
     Attributes:
-        broken: Cycles in which an assumption that is checked did not hold.
         lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
         kept: Sessions that ran, with function and mode, for the sanitized program.
         matched: Snapshots that the matchers were given.
@@ -61,7 +60,6 @@ class AgreementCount:
     sessions: int = 0
     cycles: int = 0
     matches: int = 0
-    broken: int = 0
     faults: Counter[int] = field(default_factory=Counter)
     lines: dict[str, Counter[str]] = field(default_factory=dict)
     kept: list[tuple[int, int, Stimuli, list[Seen]]] = field(default_factory=list)
@@ -176,7 +174,6 @@ def run_init(executors: Executors, target: ComparedFunction) -> Disagreement | N
 def _count(program: Program, target: ComparedFunction, compared: AgreementCount, seen: Seen) -> None:
     compared.cycles += 1
     compared.faults[seen.fault] += 1
-    compared.broken += bool(seen.failed)
     if target.kind == "step" and seen.line >= 0:
         table = program.tables[target.number]
         name = all_lines(table)[seen.line][0]

@@ -20,7 +20,7 @@ from rcsc.run.levels import RunningLevel, StateTableError
 from rcsc.run.log.read import Log
 from rcsc.run.plant.space import Space, space_of
 from rcsc.run.system import System
-from rcsc.views.pages.drawn import Drawing
+from rcsc.views.pages.data import Drawing
 
 MOST_KEPT = 50_000
 """Ticks whose poses are kept, half an hour at 40 ms; after them the older half is let go."""

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
-from rcsc.base.host.files import write_atomically
+from rcsc.code.emit.generated import written
 from rcsc.code.testing.apart import Ended, apart
 from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
@@ -75,7 +75,7 @@ def collect(
         made[looks.name] = Part(looks.root, looks.tables, looks.code, of_one)
     settings.progress("")
     making = Making(by, date, settings, {name: KINDS[name].versions() for name in names})
-    diagnostics += _written(folder, making, made)
+    diagnostics += written(_files(making, made), folder)
     return Conclusion(project.report(tuple(diagnostics)), _closing(folder, made))
 
 
@@ -171,20 +171,11 @@ def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:
         yield Diagnostic(Code.EVIDENCE_LACKS, message, Label(Span(root, 0, 0)), notes=notes)
 
 
-def _written(folder: Path, making: Making, made: Mapping[str, Part]) -> Iterator[Diagnostic]:
-    """Write every file, the index and the record; yield a diagnostic for each that the operating system refuses."""
+def _files(making: Making, made: Mapping[str, Part]) -> dict[str, str]:
+    """Return every file, the index and the record, by path below the folder."""
     files = {f"{name}/{path}": text for name, part in made.items() for path, text in part.files.items()}
     index = _index(making, made)
-    for path, text in {**files, INDEX: index, RECORD: record(making, made, index)}.items():
-        try:
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(folder / path, text.encode())
-        except OSError as error:
-            yield Diagnostic(
-                Code.NOT_WRITTEN,
-                f"`{folder / path}`: cannot be written: {error.strerror}",
-                Label(Span(str(folder), 0, 0)),
-            )
+    return {**files, INDEX: index, RECORD: record(making, made, index)}
 
 
 def _index(making: Making, made: Mapping[str, Part]) -> str:

@@ -19,7 +19,7 @@ lost. Trusted: Z3 and `relation` for that proof; the drawing for nothing. What i
 pair of values that the cells leave open.
 
 Source: Haynes et al. 1984, section 8.2 and Fig. 10. Modules, in the order the data flows: `find` (the tables somebody
-names), `labels` (cells on an edge), `derive` (a table's graph), `lines` (the graph of lines), `formats`, `to_table`,
+names), `labels` (cells on an edge), `derive` (a table's graph, of states or of lines), `formats`, `to_table`,
 `round_trip`; `layout` and `drawing` make pictures, `composites`, `curves` and `chart` those of a page, with states
 that are drawn as one.
 """

@@ -74,11 +74,6 @@ class SheetBox:
     width_px: float
     height_px: float
 
-    def holds(self, point: Point, inset_px: float = 0.0) -> bool:
-        """Return whether a point lies in the box, at least `inset_px` from its border."""
-        x, y = point[0] - self.corner[0], point[1] - self.corner[1]
-        return inset_px <= x <= self.width_px - inset_px and inset_px <= y <= self.height_px - inset_px
-
 
 @dataclass(frozen=True, slots=True)
 class SheetArrow:

@@ -1,6 +1,6 @@
 """A state graph folded: states that fail alike, or wait alike, become one composite state with one arrow.
 
-In: a `StateGraph`. Out: a `Chart` whose arrows say the same edges (`unfolded`). An arrow that leaves a composite state leaves each of
+In: a `StateGraph`. Out: a `Chart` whose arrows say the same edges. An arrow that leaves a composite state leaves each of
 its states; where a line does so from some of them only, its row names them. What stays in its state is a row of the state, not an arrow.
 
 >>> from rcsc.views.graph.formats.state_graph import Edge, StateGraph
@@ -121,14 +121,6 @@ def folded(graph: StateGraph) -> Chart:
         {state: tuple(rows) for state, rows in stays.items()},
         {state: _doing(state, edges) for state in graph.states},
     )
-
-
-def unfolded(chart: Chart) -> frozenset[Edge]:
-    """Return the edges of a chart, each as its graph has it, settled (`drawing.settled`)."""
-    rows = [row for arrow in chart.arrows for row in arrow.rows]
-    rows += [row for each in chart.composites for row in each.stays]
-    rows += [row for each in chart.stays.values() for row in each]
-    return frozenset(edge for row in rows for edge in row.edges)
 
 
 def inside(composites: Sequence[Composite], state: str) -> str:

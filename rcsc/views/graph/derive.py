@@ -1,7 +1,8 @@
-"""A table's graph, derived from what its lines mean.
+"""A table's graph, derived from what its lines mean: of its states, or of its lines.
 
 In: a program and one of its tables, as written too. Out: a `StateGraph`, and notes on what the graph does not hold; or why there is
-none. Which line leads from which state to which is answered by Z3 (`relation.steps`); the words on the edges are the table's own.
+none. Which line leads from which state to which is answered by Z3 (`relation.steps`), and so is which line can match in the cycle after
+which (`relation.follow`); the words on the edges are the table's own.
 """
 
 from collections.abc import Mapping
@@ -25,11 +26,16 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
+from rcsc.proof.relation.follow import Follow, following
 from rcsc.proof.relation.steps import Step, Steps, is_few
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.solvers.smt import UndecidedError
 from rcsc.views.graph import labels
-from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph
+from rcsc.views.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
+
+MOST_DRAWN = 2 / 3
+"""A line that can follow more than this share of the lines is drawn from every line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +74,12 @@ def derive(
                 program, table, file, written, Steps(program, table, chosen, options)
             ).derived()
     except smt.troubles():
-        message = f"the steps of table `{table.name}` are not decided within the limits"
-        return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
+        return _undecided(table, f"the steps of table `{table.name}` are")
+
+
+def _undecided(table: Table, what: str) -> Diagnostic:
+    message = f"{what} not decided within the limits"
+    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
 
 
 def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
@@ -299,3 +309,56 @@ def _of_one(first: Action, other: Action) -> bool:
     a, b = first.statement, other.statement
     alike = other.heading == first.heading and other.text == first.text
     return alike and isinstance(a, Assign) and isinstance(b, Assign) and a.place != b.place
+
+
+# --- which line follows which ---------------------------------------------------------------
+
+
+def derive_lines(program: Program, table: Table, file: tree.File, options: Options) -> Derived | Diagnostic:
+    """Derive the graph of a table's lines; the level that runs the table, if one does, is followed for a whole cycle.
+
+    It is drawn in every form, but no table is made of it. An edge says what must hold for the second line to match, beside what follows
+    from the first having matched. A line that can follow most others is drawn once, from every line, with those that it cannot follow.
+    """
+    try:
+        with smt.together(options.drawn):
+            follows = following(program, table, options)
+    except UndecidedError:
+        return _undecided(table, f"which lines of table `{table.name}` can follow which is")
+    written = labels.written_of(file, table)
+    rows = sorted(written.rows, key=lambda row: row.default)
+    names = [row.name for row in rows]
+    terms = [labels.said_by(written, row) for row in rows]
+    live = sorted({follow.line for follow in follows})
+    edges: list[Edge] = []
+    many = [at for at in live if sum(follow.then == at for follow in follows) > MOST_DRAWN * len(live)]
+    own = [follow for follow in follows if follow.then not in many]
+    common = labels.common([list(terms[follow.then].values()) for follow in own])
+    for at in live:
+        before = [follow for follow in follows if follow.then == at]
+        if at in many:
+            edges.append(_from_any(names, at, before, terms[at], live))
+        else:
+            edges += [_edge(names, follow, terms[at], common) for follow in before]
+    graph = StateGraph(
+        table.name, LINES, tuple(edges), lines=tuple(names), states=tuple(names[at] for at in live)
+    )
+    return Derived(graph, labels.guard(common))
+
+
+def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common: list[tree.Expr]) -> Edge:
+    shown = [terms[at] for at in follow.needed if terms[at] not in common]
+    whole = labels.guard(list(terms.values()))
+    return Edge("", names[follow.line], names[follow.then], whole, shown=labels.guard(shown))
+
+
+def _from_any(
+    names: list[str], at: int, before: list[Follow], terms: dict[int, tree.Expr], live: list[int]
+) -> Edge:
+    never = [names[line] for line in live if line not in {follow.line for follow in before}]
+    whole = labels.guard(list(terms.values()))
+    needed = {column for follow in before for column in follow.needed}
+    shown = labels.guard([terms[column] for column in sorted(needed)])
+    return Edge(
+        "", ANY, names[at], whole, shown=shown, decided=f"never after {', '.join(never)}" if never else ""
+    )

@@ -41,7 +41,6 @@ class Arrow:
 
     Attributes:
         leaves: The frame at whose border it begins, around `source`; "" for the box itself.
-        enters: The frame at whose border it ends, around `target`.
         tip: Whether it has one.
     """
 
@@ -50,7 +49,6 @@ class Arrow:
     width_px: float = 0.0
     height_px: float = 0.0
     leaves: str = ""
-    enters: str = ""
     tip: bool = True
 
 
@@ -164,7 +162,6 @@ def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow], frames: Sequence[
     for at, arrow in enumerate(arrows):
         more = f", label={_blank(arrow)}" if arrow.width_px else ""
         more += f", ltail={words[arrow.leaves]}" if arrow.leaves else ""
-        more += f", lhead={words[arrow.enters]}" if arrow.enters else ""
         more += "" if arrow.tip else ", arrowhead=none"
         lines.append(f'  n{number[arrow.source]} -> n{number[arrow.target]} [id="e{at}"{more}];')
     return "\n".join([*lines, "}", ""])

@@ -21,6 +21,6 @@ True
 Any system has these; a plant may add what is true of it alone (`Staged.witness`). Nothing here is trusted for a proof. What it costs: a
 copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
 
-Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `drawn` says
-what draws the world outside, `data` who knows it; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
+Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `data` says
+who knows the world outside and draws it; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
 """

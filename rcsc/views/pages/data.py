@@ -1,4 +1,4 @@
-"""Who knows what the data of a system means, as the description names it: `data_python = "MODULE:NAME"`.
+"""Who knows what the data of a system means, as the description names it (`data_python = "MODULE:NAME"`), and draws a log with it.
 
 In: a description. Out: what makes its database, shows it, and draws a log with it. A system needs none of it to run: what its levels ask
 of the data, the plant answers.
@@ -12,7 +12,33 @@ from rcsc.run.description import BadDescription, Description, needs_data
 from rcsc.run.log.read import Log
 from rcsc.run.plant.load import installed
 from rcsc.run.signature import Signature
-from rcsc.views.pages.drawn import DrawnCell
+
+
+class Drawing(Protocol):
+    """A picture of a tick."""
+
+    @property
+    def svg(self) -> str:
+        """The picture as an SVG document."""
+        ...
+
+    @property
+    def caption(self) -> tuple[str, ...]:
+        """Notes on it, a sentence each."""
+        ...
+
+
+class DrawnCell(Protocol):
+    """The world outside the levels of a log."""
+
+    @property
+    def data(self) -> str:
+        """The name of the file with the places of things."""
+        ...
+
+    def drawn(self, tick: int, *, projected: bool = False) -> Drawing:
+        """Draw a tick: in perspective alone, or in three projections with it."""
+        ...
 
 
 class Data(Protocol):

@@ -12,7 +12,7 @@ from rcsc.base.host.files import write_atomically
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
 from rcsc.run.log.ticks import LoggedTick, frames
-from rcsc.views.pages.drawn import Drawing, DrawnCell
+from rcsc.views.pages.data import Drawing, DrawnCell
 from rcsc.views.pages.frame import PAGES
 
 

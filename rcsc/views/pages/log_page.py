@@ -12,7 +12,7 @@ from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import LogColumn
 from rcsc.run.log.ticks import LoggedTick, Order, Reported, TickValue, frames
-from rcsc.views.pages.drawn import DrawnCell
+from rcsc.views.pages.data import DrawnCell
 from rcsc.views.pages.finding_page import about_cell
 from rcsc.views.pages.report import CellPicture, Matched, ReportRow, Story
 from rcsc.views.pages.witness import FRAMES_APART

@@ -5,36 +5,41 @@ In: settings. Out: matrices, and a conclusion.
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.base.diagnostics.report import TableReport
 from rcsc.base.diagnostics.source import Span
-from rcsc.base.host.cache import Cache, open_cache
-from rcsc.base.host.files import write_atomically
+from rcsc.base.host.cache import Cache, cache_of, open_cache
 from rcsc.base.host.files.read import json_of
 from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
+from rcsc.compose.proof.standing import PROPERTY, KnownVerdict
 from rcsc.driver.compile import Generated, code_of, files_of, planned, systems_in, tables_in
+from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.driver.trials import whole_vectors
-from rcsc.lang.model import ProvedProgram
-from rcsc.lang.project import project_root
+from rcsc.lang.model import Program, ProvedProgram
+from rcsc.lang.project import project_root, systems_above
 from rcsc.views.trace.kept import against, kept, names_of
-from rcsc.views.trace.matrix import Matrix, ProgramFacts, matrix, of_system
+from rcsc.views.trace.matrix import REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
 from rcsc.views.trace.page import page
-from rcsc.views.trace.proofs import property_proofs, table_proofs
 from rcsc.views.trace.requirements import covered, findings, listed, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
 
 MOST_SHOWN = 10
 """Lines of generated code that come from nothing, named in one finding."""
-
-
+_SAID = {
+    KnownVerdict.PROVED: "proved of the levels together",
+    KnownVerdict.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
+    KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
+    KnownVerdict.NOT_PROVED: REFUTED,
+}
 ANY_CODE = CodeWanted()
 """What lies beside the project, if it does."""
 
@@ -143,13 +148,46 @@ def _matrix(
     settings.progress(f"tracing {program.program.file}")
     [proof] = [proof for proof in project.proofs if proof.proved is program]
     known = ProgramFacts(
-        table_proofs(proof.tables),
+        _table_proofs(proof.tables),
         tuple((found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics),
         whole_vectors(program, settings) if wanted.vectors else None,
-        {} if cache is None else property_proofs(program.program, cache),
+        {} if cache is None else _property_proofs(program.program, cache),
         project.loaded.sources,
     )
     return matrix(plan, known)
+
+
+# --- what is proved, as far as it is known without beginning a search ---
+
+
+def _table_proofs(reports: Iterable[TableReport]) -> dict[str, TableProof]:
+    """Return the verdict of each table, by its name."""
+    return {
+        one.table: TableProof(
+            one.verdict.value, f"exactly one of {one.lines} lines matches, {one.backed}", one.assumptions
+        )
+        for one in reports
+    }
+
+
+def _property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
+    """Return the verdicts of earlier proofs of the levels together on each property; those that nobody proved are left out."""
+    return dict(_known(program, cache)) if program.properties else {}
+
+
+def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
+    own = {one.name: os.path.realpath(one.span.file) for one in program.properties}
+    for system in systems_above(program.file):
+        standing = known_of(system, cache_of(Path(system).parent, cache))
+        if standing is None:
+            continue
+        for level in standing.outline.levels:
+            for name, file in level.properties:
+                if own.get(name) == file:
+                    state = standing.of_obligation(level.name, (PROPERTY, "", name))
+                    if state in _SAID:
+                        yield name, f"{_SAID[state]}, {os.path.relpath(system)}"
+        return
 
 
 def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
@@ -157,6 +195,9 @@ def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
     generated = Generated(("c",), defensive=False, plans=plans)
     generated.add_system(path)
     return of_system(generated.systems[path], str(path))
+
+
+# --- what is told ---
 
 
 def _untraced(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:
@@ -181,14 +222,3 @@ def _figures(one: Matrix) -> str:
     named = sum(bool(line.answers) for line in one.lines)
     lines = f"{len(one.lines)} lines, {named} with a requirement, " if one.lines else ""
     return f"{lines}{pieces}, {len(one.untraced) or 'none'} from nothing"
-
-
-def written(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
-    """Write the files; what the operating system refuses."""
-    for name, content in files.items():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(folder / name, content.encode())
-        except OSError as error:
-            message = f"`{folder / name}`: cannot be written: {error.strerror}"
-            yield Diagnostic(Code.NOT_WRITTEN, message, Label(Span(str(folder), 0, 0)))

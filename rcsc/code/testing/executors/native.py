@@ -143,7 +143,6 @@ def build(
     program: Program,
     symbols: Symbols,
     sources: Mapping[str, str],
-    extra: Sequence[str] = (),
     checked: bool = True,
 ) -> Native | BuildFailed | Absent:
     """Compiles the emitted C with the shim.
@@ -152,7 +151,6 @@ def build(
         program: The program.
         symbols: Names in its emitted C.
         sources: The emitted files, text by path.
-        extra: C files of the user's that define the extern functions.
         checked: Whether to make the sanitized program too.
     """
     compiler = c_compiler()
@@ -161,16 +159,14 @@ def build(
     folder = ExitStack()
     place = folder.enter_context(scratch("test"))
     (place / "shim.c").write_text(shim_c(program, symbols), "utf-8")
-    files = ["shim.c", *write_c(sources, place), *(str(Path(name).resolve()) for name in extra)]
+    files = ["shim.c", *write_c(sources, place)]
     ran = run_command([compiler, *FLAGS, "-shared", "-fPIC", "-o", "shim.so", *files], place, COMPILE_S)
     if ran.status != 0:
         folder.close()
         return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]) or "the C compiler ran out of time")
-    program_path: Path | None = place / "checked"
     if checked:
         ran = run_command([compiler, *FLAGS, *SANITIZED, "-o", "checked", *files], place, COMPILE_S)
-    if not checked or ran.status != 0:
-        program_path = None
+    program_path = place / "checked" if checked and ran.status == 0 else None
     library = ctypes.CDLL(str(place / "shim.so"))
     library.rcsc_session.restype = None
     return Native(program, symbols, folder, library, program_path)

@@ -84,7 +84,7 @@ class PythonUnderTest:
 
 
 def python_executor(
-    program: Program, symbols: Symbols, files: Mapping[str, str], stand_ins: PythonStandIns | None = None
+    program: Program, symbols: Symbols, files: Mapping[str, str], stand_ins: PythonStandIns
 ) -> PythonUnderTest:
     """The emitted Python of a program, ready to run.
 
@@ -92,8 +92,8 @@ def python_executor(
         program: The program.
         symbols: Names in its emitted files.
         files: The emitted files, text by path.
-        stand_ins: Stand-ins for the program's externs, where it has any.
+        stand_ins: Stand-ins for the program's externs.
     """
     text = text_of(symbols.module, files)
-    module = (stand_ins or PythonStandIns(program, {})).load(text, f"rcsc_tested_{symbols.program}")
+    module = stand_ins.load(text, f"rcsc_tested_{symbols.program}")
     return PythonUnderTest(program, symbols, module)

@@ -5,8 +5,7 @@ from pathlib import Path
 from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log.read import Log
 from rcsc.run.system import signatures
-from rcsc.views.pages.data import known
-from rcsc.views.pages.drawn import Drawing, DrawnCell
+from rcsc.views.pages.data import Drawing, DrawnCell, known
 
 
 def cell_of(log: Log, path: Path) -> DrawnCell:

@@ -23,7 +23,7 @@ from rcsc.run.log.plot import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
-from rcsc.views.pages.drawn import DrawnCell
+from rcsc.views.pages.data import DrawnCell
 from rcsc.views.pages.finding_page import trace
 from rcsc.views.pages.log_page import drawn_first, story_of
 from rcsc.views.pages.report import report as run_page

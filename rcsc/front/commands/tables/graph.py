@@ -8,13 +8,12 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.front.commands.shared.graphs import ENDINGS, OUT, STEPS, WrongError, found_tables, written
 from rcsc.proof.solvers.options import Options
-from rcsc.views.graph.derive import Derived, derive
+from rcsc.views.graph.derive import Derived, derive, derive_lines
 from rcsc.views.graph.drawing import svg
 from rcsc.views.graph.find import FoundTable
 from rcsc.views.graph.formats.choice import FORMS
 from rcsc.views.graph.formats.state_graph import LINES
 from rcsc.views.graph.layout import PACKAGE, NoLayoutError
-from rcsc.views.graph.lines import derive_lines
 from rcsc.views.graph.round_trip import Against, against
 from rcsc.views.graph.to_table import tabled
 

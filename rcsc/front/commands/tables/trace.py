@@ -8,12 +8,13 @@ import click
 
 from rcsc.base.diagnostics.diagnostic import sort_key
 from rcsc.base.host.files.read import Malformed
+from rcsc.code.emit.generated import written
 from rcsc.driver.settings import CodeWanted
 from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
 from rcsc.front.commands.shared.show import Output, finish, put
 from rcsc.proof.solvers.options import Options
 from rcsc.views.trace.answer import answer, suggestions
-from rcsc.views.trace.collect import Traced, Wanted, trace, written
+from rcsc.views.trace.collect import Traced, Wanted, trace
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
