@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.views.evidence.misra.compliance import Compliance, Summary, collect, main, summary
+from rcsc.views.evidence.misra.compliance import KIND, Compliance, Summary, main, summary
 from rcsc.views.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
 from rcsc.views.evidence.misra.deviations import explained, own_findings
 from rcsc.views.evidence.misra.guidelines import RULES, Category, guidelines
@@ -34,7 +34,7 @@ def files() -> dict[str, str]:
 
 
 def test_every_guideline_has_a_row_and_each_deviation_its_place() -> None:
-    evidence = collect(subject_of(EVERYTHING))
+    evidence = KIND.collect(subject_of(EVERYTHING))
     assert not evidence.missing
     assert evidence.shortfalls == ()
     rows = list(csv.DictReader(io.StringIO(evidence.files["compliance.csv"])))
@@ -58,7 +58,7 @@ def test_a_table_of_more_than_32_lines_complies() -> None:
     text = f"input n : int 0 .. 40\noutput o : int 0 .. 40\ntable t {{\n  | line | n || o |\n{rows}}}\n"
     subject = subject_of(text)
     assert "uint64_t m" in subject.files["c/probe.c"]
-    assert collect(subject).shortfalls == ()
+    assert KIND.collect(subject).shortfalls == ()
 
 
 def test_what_is_planted_is_a_violation_although_its_rule_may_deviate_elsewhere(

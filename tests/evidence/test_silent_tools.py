@@ -113,6 +113,6 @@ def test_a_checker_without_its_add_on_shows_nothing(left: str, monkeypatch: pyte
         monkeypatch.setattr(cppcheck, "_OPTIONS", [x for x in cppcheck._OPTIONS if "addon" not in x])
     else:
         monkeypatch.setattr(cppcheck, "_RUN", "")
-    evidence = compliance.collect(subject_of(EVERYTHING))
+    evidence = compliance.KIND.collect(subject_of(EVERYTHING))
     assert "planted" in evidence.missing
     assert not evidence.files

@@ -360,13 +360,7 @@ def _positions(
     """
     lines = {
         str(table.name): scope.distinct(
-            [
-                constant_word(p, "line", table.name, name)
-                for name in (
-                    *(line.name for line in table.lines),
-                    *((table.default.name,) if table.default else ()),
-                )
-            ]
+            [constant_word(p, "line", table.name, line.name) for line in table.every_line]
         )
         for table in program.tables
     }
@@ -413,13 +407,8 @@ def _paths(
     variables = {str(v.name) for v in program.variables}
     paths: dict[str, tuple[str, ...]] = {}
     for declared in program.declared:
-        paths.update(
-            zip(
-                map(str, declared.leaves),
-                _places((roots[declared.name],), declared.type, members),
-                strict=True,
-            )
-        )
+        places = _places((roots[declared.name],), declared.type, members)
+        paths.update(zip(map(str, declared.leaves), places, strict=True))
         for leaf in declared.leaves:
             if pending(leaf) in variables:
                 paths[pending(leaf)] = (taken.fresh(f"{''.join(paths[leaf])}_next"),)

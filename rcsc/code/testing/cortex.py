@@ -66,6 +66,20 @@ def choices(
     return [(variable, every[variable.name]) for variable in used], complete
 
 
+def loops(
+    program: Program, symbols: Symbols, table: Table, most: int
+) -> tuple[list[str], list[str], list[str]]:
+    """Return C of loops over inputs of a table: their beginnings, assignments to members of a state, and their ends."""
+    begun, given = list[str](), list[str]()
+    used, _ = choices(program, table, most)
+    for at, (variable, keys) in enumerate(used):
+        values = ", ".join(constant_in_c(variable, key) for key in keys)
+        begun.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
+        begun.append(f"for (unsigned i{at} = 0; i{at} < {len(keys)}u; i{at}++) {{")
+        given.append(f"{symbols.path(variable.name)} = v{at}[i{at}];")
+    return begun, given, ["}"] * len(used)
+
+
 def leaf_values(program: Program, symbols: Symbols) -> Iterator[str]:
     """C of `scatter(s)`, which sets every leaf to one of its edges, by the simple generator `any(n)`."""
     edges = leaf_edges(program)
@@ -99,26 +113,21 @@ def _same(program: Program, symbols: Symbols) -> Iterator[str]:
 
 def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
     """The C text that runs one table on the target."""
-    table = program.tables[number]
-    struct = symbols.struct
-    used, _ = choices(program, table, most)
+    table, struct = program.tables[number], symbols.struct
+    begun, given, ended = loops(program, symbols, table, most)
     parts = [harness(), f'#include "{symbols.header}"', reference_c(program, symbols)]
     parts += ["extern uint32_t rcsc_script;", *leaf_values(program, symbols), *_same(program, symbols)]
     parts += [f"int main(void) {{ static {struct} a, b; {symbols.init}(&a);"]
-    parts += ["uint32_t inputs = 0, lines = 0, steps = 0, differ = 0;"]
-    for at, (variable, keys) in enumerate(used):
-        values = ", ".join(constant_in_c(variable, key) for key in keys)
-        parts.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
-        parts.append(f"for (unsigned i{at} = 0; i{at} < {len(keys)}u; i{at}++) {{")
+    parts += ["uint32_t inputs = 0, lines = 0, steps = 0, differ = 0;", *begun]
     parts.append("scatter(&a);" + (f" rcsc_script = any({SCRIPTS}u);" if externs(program) else ""))
-    parts += [f"a.{symbols.path(v.name)} = v{at}[i{at}];" for at, (v, _) in enumerate(used)]
+    parts += [f"a.{each}" for each in given]
     parts.append(
         f"inputs++; if (ref_t{number}_safe(&a) && {symbols.lines[table.name]}(&a) != ref_t{number}_line(&a)) {{ lines++; }}"
     )
     parts.append(f"b = a; if (ref_invariants(&b)) {{ const ref_trace_t r = ref_t{number}_step(&b);")
     parts.append(f"steps++; const int32_t fault = {symbols.steps[table.name]}(&a);")
     parts.append("if (fault != r.fault || !same(&a, &b)) { differ++; } }")
-    parts += ["}"] * len(used)
+    parts += ended
     for count, words in COUNTS.items():
         parts.append(f'say_number({count}); say("{words}");')
     parts.append("return 0; }")
@@ -126,11 +135,7 @@ def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
 
 
 def run_cortex(
-    program: Program,
-    symbols: Symbols,
-    files: Mapping[str, str],
-    number: int,
-    most: int = MOST_INPUTS,
+    program: Program, symbols: Symbols, files: Mapping[str, str], number: int, most: int = MOST_INPUTS
 ) -> CortexRun | Absent | BuildFailed:
     """Builds and runs one table's image.
 

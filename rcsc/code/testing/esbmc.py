@@ -23,12 +23,7 @@ from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.code.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
 from rcsc.lang.model import Program, Read, Real, TableByCommand, Value, VariableName, spell
 
-CHECKS = (
-    "--overflow-check",
-    "--ub-shift-check",
-    "--check-vacuity",
-    "--result-only",
-)
+CHECKS = ("--overflow-check", "--ub-shift-check", "--check-vacuity", "--result-only")
 
 SOLVERS = ("--bitwuzla", "--boolector")
 """In turn: Bitwuzla is quick and gives up on memory where Boolector gets through products of integers."""
@@ -318,20 +313,12 @@ def _prove_cases(
     kind = program.variable(VariableName(selector)).type if selector else None
     named = [(f"{selector} = {spell(kind, value)}" if kind else "admitted inputs", value) for value in values]
     cases: list[tuple[str, Value | None]] = [("refused inputs", None), *named]
+    texts = {name: case_harness(program, symbols, target, value) for name, value in cases}
     return _together(
         target,
         [
-            (
-                name,
-                ask(
-                    files,
-                    target.function,
-                    case_harness(program, symbols, target, value),
-                    timeout_s,
-                    with_sources=True,
-                ),
-            )
-            for name, value in cases
+            (name, ask(files, target.function, text, timeout_s, with_sources=True))
+            for name, text in texts.items()
         ],
     )
 

@@ -54,16 +54,7 @@ from rcsc.code.testing.executors.symbols import Symbols, text_of
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import boxes_of
 from rcsc.lang.interval_sets import holds as contains
-from rcsc.lang.model import (
-    Program,
-    Real,
-    Snapshot,
-    Table,
-    Variable,
-    key_bounds,
-    key_of,
-    value_of_key,
-)
+from rcsc.lang.model import Program, Real, Snapshot, Table, Variable, key_bounds, key_of, value_of_key
 
 RUN_S = 300.0
 EVERY_KEY = 4096

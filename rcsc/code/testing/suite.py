@@ -329,11 +329,7 @@ def run_suite(
 
 
 def _run(
-    stand_ins: PythonStandIns,
-    files: Mapping[str, str],
-    options: SuiteOptions,
-    proofs: Proofs,
-    native: Native,
+    stand_ins: PythonStandIns, files: Mapping[str, str], options: SuiteOptions, proofs: Proofs, native: Native
 ) -> SuiteResult:
     program = stand_ins.program
     python = python_executor(program, native.symbols, files, stand_ins)

@@ -100,7 +100,7 @@ class Finding:
     @property
     def reason(self) -> str:
         """The reason why the code is meant so; "" where nothing explains it."""
-        return next((EXPLAINED[name] for name in self.check.split(",") if name in EXPLAINED), "")
+        return next(_reasons(self.check), "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from rcsc.code.testing.coverage.vector_set import defended, figure, vector_set
 from rcsc.driver.trials import proofs
 from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject, versions_of
 from rcsc.views.evidence.llvm import Measured, Tools, measured, tools
-from rcsc.views.evidence.out_of_reach import Missed, Reasons
+from rcsc.views.evidence.out_of_reach import Missed, Reasons, uncovered
 
 GUARDED = "defensive"
 """Prefix of the places, and folder of the files, of C that trusts no state."""
@@ -83,11 +83,7 @@ def _shortfalls(document: VectorSet, seen: Measured, missed: Sequence[Missed]) -
     whole = f"{len(document.kept)} vectors, 0 wrong"
     if not failing and not (seen.passed and whole in seen.played):
         found.append(Shortfall(source, "the program that plays the vectors stopped"))
-    return found + [
-        Shortfall(f"{source}:{each.line}", f"{each.function}: not covered: {each.what}")
-        for each in missed
-        if not each.reason
-    ]
+    return found + uncovered(source, missed)
 
 
 def _report(llvm: Tools, document: VectorSet, seen: Measured, missed: Sequence[Missed]) -> str:

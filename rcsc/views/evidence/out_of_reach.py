@@ -6,7 +6,7 @@ the conditions of its procedure in the same order; where their numbers differ, n
 """
 
 import re
-from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.code.emit.c.ctext import DIVIDED, SHORT, c_type
@@ -20,6 +20,7 @@ from rcsc.code.testing.coverage.marks import Decision as Marked
 from rcsc.code.testing.coverage.marks import Place
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Admit, Bool, Kind, Level, Real, Table
+from rcsc.views.evidence.kind import Shortfall
 from rcsc.views.evidence.llvm import Decision, Measured, Point, Region
 
 LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
@@ -55,6 +56,15 @@ class Missed:
     line: int
     what: str
     reason: str
+
+
+def uncovered(source: str, missed: Iterable[Missed]) -> list[Shortfall]:
+    """Return a shortfall for each place of a C file that was not covered, and that no reason explains."""
+    return [
+        Shortfall(f"{source}:{each.line}", f"{each.function}: not covered: {each.what}")
+        for each in missed
+        if not each.reason
+    ]
 
 
 @dataclass(slots=True)

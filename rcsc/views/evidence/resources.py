@@ -10,7 +10,7 @@ meets combinations of the values of its own test variables. Values are ends of r
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from rcsc.base.host.children import scratch
@@ -18,7 +18,7 @@ from rcsc.base.host.files import csv_text, read
 from rcsc.base.host.tools import BuildFailed, ending, run_command
 from rcsc.code.emit.plan import Plan
 from rcsc.code.testing.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
-from rcsc.code.testing.cortex import choices, constant_in_c, leaf_values
+from rcsc.code.testing.cortex import leaf_values, loops
 from rcsc.code.testing.executors.externs import STAND_INS, c_stand_ins, externs
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import Kind as VariableKind
@@ -45,11 +45,11 @@ class Need:
     Attributes:
         frame: Bytes of its own stack.
         chain: Bytes of stack of its deepest chain of calls, without what the compiler's library takes; None where a frame is not static.
-        bound: Instructions of its longest path; None where `unbounded` says why.
         alone: Bytes of code and constants of an image with it alone; None for a function of the file's own.
         calls: The number of its calls in the sessions; 0 for a function of the file's own.
         observed: The most instructions that a call took.
         deepest: The most bytes of stack that a call took, with those of the compiler's library.
+        bound: Instructions of its longest path; None where `unbounded` says why.
     """
 
     board: str
@@ -57,12 +57,12 @@ class Need:
     code: int
     frame: int
     chain: int | None
+    alone: int | None
+    calls: int
+    observed: int | None
+    deepest: int | None
     bound: int | None
-    unbounded: str = ""
-    alone: int | None = None
-    calls: int = 0
-    observed: int | None = None
-    deepest: int | None = None
+    unbounded: str
 
 
 def collect(subject: Subject) -> Evidence:
@@ -88,14 +88,10 @@ def collect(subject: Subject) -> Evidence:
     return Evidence(tuple(_figures(needs)), files, tuple(short))
 
 
-def _versions() -> dict[str, str]:
-    return versions_of(
-        *([tool, "--version"] for board in BOARDS for tool in (board.compiler[0], board.emulator[0]))
-    )
-
-
 KIND = Kind(
-    "stack, code and instructions of each function, on emulated Cortex-M and RISC-V", collect, _versions
+    "stack, code and instructions of each function, on emulated Cortex-M and RISC-V",
+    collect,
+    lambda: versions_of(*([tool, "--version"] for b in BOARDS for tool in (b.compiler[0], b.emulator[0]))),
 )
 
 
@@ -165,19 +161,13 @@ def image_c(plan: Plan, symbols: Symbols, entries: Mapping[str, str]) -> str:
     parts += [f"{name}(&a);" for name in (*symbols.cycles.values(), *symbols.steps.values())[:1]]
     parts += ["} }"]
     for table in program.tables:
-        used, _ = choices(program, table, COMBINATIONS)
-        parts.append("{")
-        for at, (variable, keys) in enumerate(used):
-            values = ", ".join(constant_in_c(variable, key) for key in keys)
-            parts.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
-            parts.append(f"for (unsigned i{at} = 0; i{at} < {len(keys)}u; i{at}++) {{")
+        begun, given, ended = loops(program, symbols, table, COMBINATIONS)
+        parts += ["{", *begun]
         parts.append(
             f"{symbols.init}(&a); b = a; scatter(&b); if ({symbols.program}_check(&b) == -1) {{ a = b; }}"
         )
-        parts.append("b = a;")
-        parts += [f"b.{symbols.path(v.name)} = v{at}[i{at}];" for at, (v, _) in enumerate(used)]
-        parts.append(f"if ({symbols.program}_check(&b) == -1) {{ a = b; all(); }}")
-        parts.append("}" * (len(used) + 1))
+        parts += ["b = a;", *(f"b.{each}" for each in given)]
+        parts += [f"if ({symbols.program}_check(&b) == -1) {{ a = b; all(); }}", *ended, "}"]
     parts += [f'tell("{name}", &seen[{at}], &none);' for at, name in enumerate(entries)]
     return "\n".join((*parts, "return 0; }")) + "\n"
 
@@ -214,15 +204,12 @@ def _needs(
         frame = frames.get(_original(function), (0, True))
         chain = _chain(function, bounds, frames)
         bound, reason = _bound(bounds, function)
-        need = Need(board.name, function, codes.get(function, 0), frame[0], chain, bound, reason)
+        seen: tuple[int | None, int, int | None, int | None] = None, 0, None, None
         if function in entries:
             calls, observed, deepest = told[function]
             most = None if observed == OVERRUN else observed
-            alone = _alone(board, place, function)
-            need = Need(
-                need.board, function, need.code, need.frame, chain, bound, reason, alone, calls, most, deepest
-            )
-        yield need
+            seen = _alone(board, place, function), calls, most, deepest
+        yield Need(board.name, function, codes.get(function, 0), frame[0], chain, *seen, bound, reason)
 
 
 def _loops(text: str) -> dict[int, int]:
@@ -324,23 +311,8 @@ COLUMNS = (
 
 
 def _csv(needs: Sequence[Need]) -> str:
-    rows = [
-        (
-            n.board,
-            n.function,
-            n.code,
-            n.frame,
-            n.chain,
-            n.alone,
-            n.calls,
-            n.observed,
-            n.deepest,
-            n.bound,
-            n.unbounded,
-        )
-        for n in needs
-    ]
-    return csv_text([COLUMNS, *(["" if value is None else value for value in row] for row in rows)])
+    rows = (["" if value is None else value for value in astuple(need)] for need in needs)
+    return csv_text([COLUMNS, *rows])
 
 
 def _page(name: str, boards: Sequence[Board], needs: Sequence[Need]) -> str:
@@ -371,7 +343,9 @@ _INTRODUCTION = (
 
 def _rows(needs: Sequence[Need], *, entries: bool) -> Iterator[str]:
     """Yield a table of Markdown."""
-    yield from _headed(ENTRY_COLUMNS if entries else OWN_COLUMNS)
+    heads = ENTRY_COLUMNS if entries else OWN_COLUMNS
+    yield f"| {' | '.join(heads)} |"
+    yield f"|{'|'.join(['---', *['---:'] * (len(heads) - 1)])}|"
     for n in needs:
         bound = str(n.bound) if n.bound is not None else f"none: {n.unbounded}"
         seen: tuple[object, ...] = (n.code, n.alone, n.chain, n.deepest, n.calls, n.observed, bound)
@@ -383,11 +357,6 @@ ENTRY_COLUMNS = (
     "function", "code", "image", "stack", "stack observed", "calls", "instructions observed", "bound",
 )  # fmt: skip
 OWN_COLUMNS = ("function", "code", "frame", "stack", "bound")
-
-
-def _headed(heads: Sequence[str]) -> Iterator[str]:
-    yield f"| {' | '.join(heads)} |"
-    yield f"|{'|'.join(['---', *['---:'] * (len(heads) - 1)])}|"
 
 
 def _figures(needs: Sequence[Need]) -> Iterator[str]:

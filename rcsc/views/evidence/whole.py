@@ -24,7 +24,7 @@ from rcsc.views.evidence import analysers
 from rcsc.views.evidence.kind import Evidence, Shortfall
 from rcsc.views.evidence.llvm import Measured, Point, measured, tools
 from rcsc.views.evidence.misra import compliance
-from rcsc.views.evidence.out_of_reach import Missed
+from rcsc.views.evidence.out_of_reach import Missed, uncovered
 
 STEPS = 40_000
 """Steps of the drawn sessions: twice what reaches the last branch of the paper's system."""
@@ -74,11 +74,7 @@ def _coverage(whole: Whole) -> Evidence:
         f"by llvm-cov {llvm.version}, in {STEPS} drawn steps; what a step must give is compared by `rcsc test`",
     )
     short = [Shortfall(whole.source, "the drawn sessions stopped")] if not seen.passed else []
-    short += [
-        Shortfall(f"{whole.source}:{each.line}", f"{each.function}: not covered: {each.what}")
-        for each in missed
-        if not each.reason
-    ]
+    short += uncovered(whole.source, missed)
     rows = [("line", "function", "what", "reason")]
     rows += [(str(each.line), each.function, each.what, each.reason) for each in missed]
     files = {"drawn.c": main, "coverage.txt": seen.text, "missed.csv": csv_text(rows)}

@@ -231,9 +231,7 @@ def _cross(one: set[str], other: set[str]) -> bool:
 
 
 def _arrows(
-    edges: Sequence[Edge],
-    fans: Mapping[str, tuple[str, ...]],
-    composites: Sequence[Composite],
+    edges: Sequence[Edge], fans: Mapping[str, tuple[str, ...]], composites: Sequence[Composite]
 ) -> Iterator[ChartArrow]:
     """Yield the arrows; edges of a fan leave the smallest composite that has all of its states."""
     found: dict[tuple[str, str, bool], list[Edge]] = {}

@@ -11,19 +11,7 @@ from dataclasses import dataclass, field, replace
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.lang.leaves import may_write
-from rcsc.lang.model import (
-    Action,
-    Assign,
-    Default,
-    Enum,
-    Kind,
-    Line,
-    Program,
-    Table,
-    Value,
-    Variable,
-    spell,
-)
+from rcsc.lang.model import Action, Assign, Default, Enum, Kind, Line, Program, Table, Value, Variable, spell
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_condition, spell_expr
 from rcsc.proof.relation.follow import Follow, following

@@ -152,9 +152,7 @@ def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diag
                 if any(v.name == variable.name for variable in program.variables)
             ]
             column = WitnessColumn(
-                table.name,
-                tuple(v.name for v, _ in shown),
-                tuple(spell(v.type, value) for v, value in shown),
+                table.name, tuple(v.name for v, _ in shown), tuple(spell(v.type, value) for v, value in shown)
             )
             what = f"the table comes to {_outcome(first)}, the graph to {_outcome(second)}"
             more = f" and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""

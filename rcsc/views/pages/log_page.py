@@ -43,11 +43,7 @@ class _Ordered:
         return ReportRow(number, f"{self.level}: {self.text}", self.state or "under way", cycles, self.reason)
 
 
-def story_of(
-    log: Log,
-    cell: DrawnCell | None = None,
-    why_not: str = "",
-) -> Story:
+def story_of(log: Log, cell: DrawnCell | None = None, why_not: str = "") -> Story:
     """Return the story of the log, for a page.
 
     Args:

@@ -171,9 +171,7 @@ def report(path: Path, story: Story) -> None:
 def page(story: Story) -> str:
     """Return the page; equal stories give equal text."""
     return PAGES.get_template("report.html.jinja").render(
-        story=story,
-        seconds=lambda tick: tick * story.tick_ms / 1000,
-        tables=_tables(story.matched),
+        story=story, seconds=lambda tick: tick * story.tick_ms / 1000, tables=_tables(story.matched)
     )
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 from rcsc import __version__
 from rcsc.base.host.files import csv_text
+from rcsc.lang.expressions.operators import kind_word
 from rcsc.lang.leaves import Uses
 from rcsc.lang.model import (
     Array,
-    Bool,
     Declared,
     Enum,
     Int,
@@ -23,8 +23,6 @@ from rcsc.lang.model import (
     Program,
     Real,
     Record,
-    Scalar,
-    Single,
     Variable,
     spell,
     unit_text,
@@ -122,10 +120,10 @@ def _named(
     variable: Variable, meaning: str, restart: str, uses: Uses, level: str, places: Mapping[str, str], system: Description | None
 ) -> NamedVariable:  # fmt: skip
     kind, name = variable.type, variable.name
-    low, high = _ends(kind)
+    low, high = (spell(kind, kind.low), spell(kind, kind.high)) if isinstance(kind, Int | Real) else ("", "")
     comes_from, goes_to = _buffers(system, level, name)
     return NamedVariable(
-        level=level, name=str(name), kind=variable.kind.value, type=_word(kind), lowest=low, highest=high,
+        level=level, name=str(name), kind=variable.kind.value, type=kind_word(kind).strip("`"), lowest=low, highest=high,
         members=kind.members if isinstance(kind, Enum) else (), unit=unit_text(kind.unit) if isinstance(kind, Int | Real) else "",
         initial=spell(kind, variable.initial), restart=restart, meaning=meaning,
         comes_from=comes_from, goes_to=goes_to, written_by=_listed(uses.written.get(name, {})), read_by=_listed(uses.read.get(name, {})),
@@ -145,22 +143,6 @@ def _meaning(declared: Declared | None, variable: Variable) -> str:
                 break  # the pending value of a deferred variable
             kind, meaning = field.type, field.doc or meaning
     return " ".join(meaning.split())
-
-
-def _word(kind: Scalar) -> str:
-    match kind:
-        case Enum(name):
-            return name
-        case Bool():
-            return "bool"
-        case Int():
-            return "int"
-        case _:
-            return "single" if isinstance(kind, Single) else "real"
-
-
-def _ends(kind: Scalar) -> tuple[str, str]:
-    return (spell(kind, kind.low), spell(kind, kind.high)) if isinstance(kind, Int | Real) else ("", "")
 
 
 def _restart(variable: Variable, adopted: Adopted | None) -> str:

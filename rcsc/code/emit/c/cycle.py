@@ -224,8 +224,7 @@ def _table_run(c: CProgram, table: str) -> Do:
 def _stage(c: CProgram, table: str) -> Body:
     """Return code for a table that others follow: the trace's line is the last table's; a fault for want of a line names this one."""
     unmatched = Infix(
-        "||",
-        tuple(infix("==", FAULT, fault_name(c, end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES)),
+        "||", tuple(infix("==", FAULT, fault_name(c, end)) for end in (Fault.NO_LINE, Fault.SEVERAL_LINES))
     )
     named = when(unmatched, Set(FAULT_AT, Name(c.names.places[table])))
     return _table_run(c, table), Set(LINE, NONE), named

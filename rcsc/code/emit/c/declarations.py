@@ -217,10 +217,7 @@ def user_functions(c: CProgram) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield each user function with the types of its parameters; a pointer's ends in a star."""
     for procedure in c.program.procedures:
         if procedure.extern is not None:
-            yield (
-                procedure.extern.c,
-                tuple(kind.replace(" ", "") for kind, _ in _parameters(c, procedure)),
-            )
+            yield (procedure.extern.c, tuple(kind.replace(" ", "") for kind, _ in _parameters(c, procedure)))
 
 
 def externs(c: CProgram) -> Iterator[Member]:

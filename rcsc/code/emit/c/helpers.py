@@ -2,21 +2,8 @@
 
 from collections.abc import Mapping
 
-from rcsc.code.emit.c.ctext import (
-    FLOATS,
-    SHORT,
-)
-from rcsc.code.emit.code_tree import (
-    Cast,
-    Choice,
-    Constant,
-    Function,
-    Leave,
-    Let,
-    Name,
-    Prefix,
-    infix,
-)
+from rcsc.code.emit.c.ctext import FLOATS, SHORT
+from rcsc.code.emit.code_tree import Cast, Choice, Constant, Function, Leave, Let, Name, Prefix, infix
 
 HELD: Mapping[str, str] = {
     "atleast": "A value that was proved to be no less than this: it is as it was.",

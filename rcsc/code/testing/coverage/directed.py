@@ -239,17 +239,10 @@ class Director:
             if function is None or possible is values.FALSE:
                 continue
             self.left -= 1
-            answer = self.asks([*function.base, possible])
-            if not isinstance(answer, Missing):
-                start = initial(self.choice.program)
-                state = {name: answer.get(name, value) for name, value in start.items()}
-                self.choice.offer(
-                    Case(
-                        entry,
-                        state,
-                        origin=f"solved for a bound of a comparison in {entry.kind} {entry.name}",
-                    )
-                )
+            state = self._state([*function.base, possible])
+            if not isinstance(state, Missing):
+                origin = f"solved for a bound of a comparison in {entry.kind} {entry.name}"
+                self.choice.offer(Case(entry, state, origin=origin))
 
     def _of_table(self, table: Table) -> Iterator[Unreached]:
         """Lines that no step ran, and that no line matches, or several."""
@@ -293,14 +286,12 @@ class Director:
     def _ended(self, function: Followed, table: str, which: int) -> str | None:
         """Why no case ends a cycle at a table; None where one does."""
         fault = Fault.NO_LINE if which == NONE else Fault.SEVERAL_LINES
-        answer = self.asks([*function.base, function.ends[(table, which)]])
-        if isinstance(answer, Missing):
-            return SHOWN if answer is Missing.NONE else "the solver gave no answer"
-        state = {name: answer.get(name, value) for name, value in initial(self.choice.program).items()}
-        case = Case(function.entry, state, origin=f"solved for table {table} without one line")
-        self.choice.offer(case)
+        state = self._state([*function.base, function.ends[(table, which)]])
+        if isinstance(state, Missing):
+            return SHOWN if state is Missing.NONE else NO_ANSWER
+        self.choice.offer(Case(function.entry, state, origin=f"solved for table {table} without one line"))
         ends = any(hit[:3] == ("fault", function.entry, int(fault)) for hit in self.choice.reached.hits)
-        return None if ends else "the solver's input was not confirmed"
+        return None if ends else NOT_CONFIRMED
 
     def _matched(self, table: Table, wanted: Expr, words: tuple[str, str], key: Hit) -> Iterator[Unreached]:
         """Look for an input of a table for which a condition holds; why there is none."""
@@ -312,37 +303,25 @@ class Director:
         run = Run.of(program, {})
         rests = [a.condition for a in program.assumptions if a.name in table.stops]
         given = [run.evaluate(each) for each in (*(i.condition for i in program.invariants), *rests)]
-        answer = self.asks([*given, run.evaluate(wanted)])
-        if answer is Missing.NONE:
+        state = self._state([*given, run.evaluate(wanted)])
+        if state is Missing.NONE:
             yield Unreached(where, what, "true", shown=True, reason=SHOWN, key=key)
             return
-        if not isinstance(answer, Missing):
-            state = {name: answer.get(name, value) for name, value in initial(program).items()}
+        if not isinstance(state, Missing):
             deferred = [v.name for v in program.variables if v.deferred_until is not None]
             state |= {str(pending(name)): state[name] for name in deferred}
             for kind in ("line", "step"):
-                self.choice.offer(
-                    Case(Entry(kind, str(table.name)), state, origin=f"solved for {where}: {what}")
-                )
+                case = Case(Entry(kind, str(table.name)), state, origin=f"solved for {where}: {what}")
+                self.choice.offer(case)
         if key not in self.choice.reached.hits:
-            why = (
-                "the solver gave no answer"
-                if isinstance(answer, Missing)
-                else "the solver's input was not confirmed"
-            )
+            why = NO_ANSWER if isinstance(state, Missing) else NOT_CONFIRMED
             yield Unreached(where, what, "true", shown=False, reason=why, key=key)
 
     def look(self, goal: Goal) -> Unreached | None:
         """Find a case for a goal, or say why there is none."""
-        if goal.truth is not None:
-
-            def wanted() -> Iterator[tuple[Outcomes, bool]]:
-                return (way for way in self._ways(goal.decision) if way[0][goal.number] is goal.truth)
-
-            return self._until(goal, lambda: self._has(goal), [wanted])
-        return self._until(
-            goal, lambda: self._has(goal), [lambda: self._partners(goal), lambda: self._others(goal)]
-        )
+        if goal.truth is None:
+            return self._until(goal, self._partners, self._others)
+        return self._until(goal, self._true_to)
 
     def _has(self, goal: Goal) -> bool:
         ways = self._known(goal.decision)
@@ -355,6 +334,10 @@ class Director:
 
     def _ways(self, decision: Decision) -> list[tuple[Outcomes, bool]]:
         return [((True,), True), ((False,), False)] if decision.form is None else ways_of(decision.form)
+
+    def _true_to(self, goal: Goal) -> Iterator[tuple[Outcomes, bool]]:
+        """Ways in which the condition has the truth that it is to have."""
+        return (way for way in self._ways(goal.decision) if way[0][goal.number] is goal.truth)
 
     def _partners(self, goal: Goal) -> Iterator[tuple[Outcomes, bool]]:
         """Ways that show the condition together with one that was met."""
@@ -371,26 +354,23 @@ class Director:
         return (w for w in self._ways(goal.decision) if w not in known and w[0][goal.number] is not None)
 
     def _until(
-        self,
-        goal: Goal,
-        reached: Callable[[], bool],
-        wanted: Sequence[Callable[[], Iterable[tuple[Outcomes, bool]]]],
+        self, goal: Goal, *wanted: Callable[[Goal], Iterable[tuple[Outcomes, bool]]]
     ) -> Unreached | None:
         """Ask for wanted ways until the goal is reached, or none is left."""
         for ways in wanted:
             for _ in range(MOST_QUESTIONS):
-                if reached():
+                if self._has(goal):
                     return None
-                answer = self._find(goal.decision, list(ways()))
+                answer = self._find(goal.decision, list(ways(goal)))
                 if isinstance(answer, str):
                     return self._unreached(goal, shown=False, reason=answer)
                 if not answer:
                     break
             else:
-                return None if reached() else self._unreached(goal, shown=False, reason=MANY)
-        if not reached() and len(self._ways(goal.decision)) >= MOST_WAYS:
+                return None if self._has(goal) else self._unreached(goal, shown=False, reason=MANY)
+        if not self._has(goal) and len(self._ways(goal.decision)) >= MOST_WAYS:
             return self._unreached(goal, shown=False, reason=MANY)
-        return None if reached() else self._unreached(goal, shown=True, reason=SHOWN)
+        return None if self._has(goal) else self._unreached(goal, shown=True, reason=SHOWN)
 
     def _unreached(self, goal: Goal, *, shown: bool, reason: str) -> Unreached:
         key = "decision", self.choice.reached.number_of(goal.decision), goal.number, goal.truth
@@ -416,26 +396,28 @@ class Director:
             )
             if possible is values.FALSE:
                 continue
-            answer = self.asks([*function.base, possible])
-            if answer is Missing.UNKNOWN:
-                unknown = "the solver gave no answer"
-            elif not isinstance(answer, Missing):
-                if self._offer(entry, decision, answer):
+            state = self._state([*function.base, possible])
+            if state is Missing.UNKNOWN:
+                unknown = NO_ANSWER
+            elif not isinstance(state, Missing):
+                before = len(self._known(decision))
+                self.choice.offer(Case(entry, state, origin=f"solved for {decision.place}"))
+                if len(self._known(decision)) > before:
                     return True
-                unknown = "the solver's input was not confirmed"
+                unknown = NOT_CONFIRMED
         return unknown or False
+
+    def _state(self, conditions: Sequence[Node]) -> dict[str, Value] | Missing:
+        """Return a state with inputs in which all conditions hold; what they leave open is initial."""
+        answer = self.asks(conditions)
+        if isinstance(answer, Missing):
+            return answer
+        return {name: answer.get(name, value) for name, value in initial(self.choice.program).items()}
 
     def _function(self, entry: Entry) -> Followed | None:
         if entry not in self.functions:
             self.functions[entry] = followed(self.choice.program, self.choice.reached.marked, entry)
         return self.functions[entry]
-
-    def _offer(self, entry: Entry, decision: Decision, point: Mapping[str, Value]) -> bool:
-        """Whether a case made of the solver's values is new to the decision."""
-        program, before = self.choice.program, len(self._known(decision))
-        state = {name: point.get(name, value) for name, value in initial(program).items()}
-        self.choice.offer(Case(entry, state, origin=f"solved for {decision.place}"))
-        return len(self._known(decision)) > before
 
 
 def _apart(left: Node, right: Node, by: int) -> Node:
@@ -449,6 +431,7 @@ def _apart(left: Node, right: Node, by: int) -> Node:
 
 
 MANY = "the decision can go too many ways"
+NO_ANSWER, NOT_CONFIRMED = "the solver gave no answer", "the solver's input was not confirmed"
 PROVED = "proved by `rcsc check`: exactly one line matches"
 SHOWN = "shown impossible for every admitted input and every state that `check` accepts"
 

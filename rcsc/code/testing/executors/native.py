@@ -140,10 +140,7 @@ def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequenc
 
 
 def build(
-    program: Program,
-    symbols: Symbols,
-    sources: Mapping[str, str],
-    checked: bool = True,
+    program: Program, symbols: Symbols, sources: Mapping[str, str], checked: bool = True
 ) -> Native | BuildFailed | Absent:
     """Compiles the emitted C with the shim.
 

@@ -14,17 +14,7 @@ from rcsc.code.testing.executors.sessions import Stimuli
 from rcsc.lang.interpret import evaluate
 from rcsc.lang.interval_sets import holds
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import (
-    Expr,
-    Line,
-    Program,
-    Snapshot,
-    Table,
-    Value,
-    Variable,
-    key_bounds,
-    value_of_key,
-)
+from rcsc.lang.model import Expr, Line, Program, Snapshot, Table, Value, Variable, key_bounds, value_of_key
 
 BROKEN = 0.2  # how often an assumption that is checked is aimed at, to break it
 TRIES = 40  # values of what an assumption reads, of which the first that break it are taken

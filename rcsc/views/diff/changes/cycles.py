@@ -14,16 +14,7 @@ from dataclasses import dataclass
 
 from rcsc.lang.digest import Digests
 from rcsc.lang.interpret import initial
-from rcsc.lang.model import (
-    Call,
-    Level,
-    Line,
-    ProcedureName,
-    Program,
-    Statement,
-    Table,
-    pending,
-)
+from rcsc.lang.model import Call, Level, Line, ProcedureName, Program, Statement, Table, pending
 from rcsc.proof.relation.follow import following
 from rcsc.proof.relation.questions import Independent, pair_is
 from rcsc.proof.relation.steps import is_few

@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 from rcsc.lang.hidden import hidden, keeps
-from rcsc.lang.interpret import call, execute
+from rcsc.lang.interpret import call
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import (
@@ -39,7 +39,7 @@ from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.views.diff.changes.contrast import changes, contrast
 from rcsc.views.diff.changes.difference import Basis, Change, ComparedPart, PartSort
 from rcsc.views.diff.changes.value_text import number
-from rcsc.views.diff.changes.versions import Doing, Runner, Versions
+from rcsc.views.diff.changes.versions import Doing, Runner, Versions, runner
 
 
 def procedures(versions: Versions) -> Iterator[ComparedPart]:
@@ -60,9 +60,8 @@ def _procedure(versions: Versions, old: Procedure, new: Procedure) -> ComparedPa
     if first.procedure(name) == second.procedure(name):
         return ComparedPart("procedure", name, basis=Basis.DIGEST)
     calls: list[Statement] = [Call(ProcedureName(name))]
-    apart = sorted(versions.aligned.apart & (first.touched(calls, ()) | second.touched(calls, ())))
-    if apart:
-        return ComparedPart("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    if apart := _apart(versions, first.touched(calls, ()) | second.touched(calls, ())):
+        return ComparedPart("procedure", name, apart)
     if [(p.name, _kind(p.type)) for p in old.params] != [(p.name, _kind(p.type)) for p in new.params]:
         return ComparedPart("procedure", name, ("its parameters changed",))
     args = [
@@ -74,6 +73,14 @@ def _procedure(versions: Versions, old: Procedure, new: Procedure) -> ComparedPa
     runner = partial(_call, name, [node.name for node in args])
     effects = [meaning.procedure(name, args) for meaning in versions.meanings()]
     return _effects(versions, "procedure", name, (effects[0], effects[1]), (runner, runner))
+
+
+def _apart(versions: Versions, leaves: set[str]) -> tuple[str, ...]:
+    """Return a note where what speaks of these leaves cannot be compared."""
+    return tuple(
+        f"cannot be compared: `{leaf}` changed its kind"
+        for leaf in sorted(versions.aligned.apart & leaves)[:1]
+    )
 
 
 def _kind(kind: Scalar) -> object:
@@ -94,10 +101,6 @@ def _narrower(first: Scalar, second: Scalar) -> Scalar:
 
 def _call(name: str, args: list[str], program: Program, now: dict[str, Value]) -> None:
     call(program, name, [now.pop(arg) if arg.startswith("argument ") else now[arg] for arg in args], now)
-
-
-def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None:
-    execute(program, body, now, {})
 
 
 def _effects(
@@ -177,13 +180,10 @@ def _sequence(
     first, second = versions.digests
     if first.body(bodies[0]) == second.body(bodies[1]):
         return ComparedPart(what, level, basis=Basis.DIGEST)
-    apart = sorted(versions.aligned.apart & (first.touched(bodies[0], ()) | second.touched(bodies[1], ())))
-    if apart:
-        return ComparedPart(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    if apart := _apart(versions, first.touched(bodies[0], ()) | second.touched(bodies[1], ())):
+        return ComparedPart(what, level, apart)
     before, after = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
-    return _effects(
-        versions, what, level, (before, after), (partial(_run, bodies[0]), partial(_run, bodies[1]))
-    )
+    return _effects(versions, what, level, (before, after), (runner(bodies[0]), runner(bodies[1])))
 
 
 # --- what no comparison has looked at -----------------------------------------------------------
@@ -344,8 +344,8 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     if repr(pair[0]) == repr(pair[1]):
         return ComparedPart(what, name, basis=Basis.DIGEST)
     read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
-    if apart := sorted(versions.aligned.apart & read):
-        return ComparedPart(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    if apart := _apart(versions, read):
+        return ComparedPart(what, name, apart)
     before = versions.tally.queries
     old, new = (
         _worth(meaning, condition, undefined="false" if what == "property" else "undefined")

@@ -5,18 +5,17 @@ other; when the solver finds no more, that is the proof that nothing else change
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 
-from rcsc.lang.interpret import execute, matching_lines
+from rcsc.lang.interpret import matching_lines
 from rcsc.lang.leaves import everything, written_by
-from rcsc.lang.model import Action, Bool, Call, Program, Statement, Table, Value
+from rcsc.lang.model import Action, Bool, Call, Program, Statement, Table
 from rcsc.proof.relation.effect import Meaning
 from rcsc.proof.relation.same import NO_LINE, SEVERAL_LINES, UNDEFINED, Outcome, outcomes
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
 from rcsc.views.diff.changes.contrast import Contrast, changes, contrast
 from rcsc.views.diff.changes.difference import Basis, Change, ComparedPart, PartSort
-from rcsc.views.diff.changes.versions import Doing, Versions, is_hard
+from rcsc.views.diff.changes.versions import Doing, Versions, is_hard, runner
 
 
 def table_part(versions: Versions, before: Table, after: Table) -> ComparedPart:
@@ -136,7 +135,7 @@ class _Comparison:
                 changes(versions, PartSort.FAULT, labels, both, self.relied), before, after
             )
         doing = [
-            Doing(meaning.effect(_body(out.actions), (before.holds, after.holds)), partial(_run, _body(out.actions)),
+            Doing(meaning.effect(_body(out.actions), (before.holds, after.holds)), runner(_body(out.actions)),
                   _headings(meaning.program, out.actions))
             for out, meaning in zip((before, after), self.meanings, strict=True)
         ]  # fmt: skip
@@ -213,10 +212,6 @@ def _label(table: Table, out: Outcome) -> str:
 
 def _body(actions: tuple[Action, ...] | None) -> list[Statement]:
     return [action.statement for action in actions or ()]
-
-
-def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None:
-    execute(program, body, now, {})
 
 
 def _headings(program: Program, actions: tuple[Action, ...] | None) -> Mapping[str, tuple[str, ...]]:

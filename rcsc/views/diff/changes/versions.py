@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.lang.digest import Digests
-from rcsc.lang.interpret import initial
+from rcsc.lang.interpret import execute, initial
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
@@ -18,6 +18,7 @@ from rcsc.lang.model import (
     Program,
     Real,
     Scalar,
+    Statement,
     Table,
     earlier,
     key_bounds,
@@ -47,6 +48,11 @@ COVER_STEPS = 1_000_000
 
 Runner = Callable[[Program, dict[str, Scalars]], None]
 """Runs a version's part on a snapshot, in place."""
+
+
+def runner(body: Sequence[Statement]) -> Runner:
+    """Return what runs statements."""
+    return lambda program, now: execute(program, body, now, {})
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from rcsc.base.host.files import csv_text, read
-from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall
 from rcsc.views.evidence.misra.cppcheck import (
     MISSING,
     OWN,
@@ -144,11 +144,6 @@ def _plain(files: Mapping[str, str]) -> bool:
 # --- as evidence -----------------------------------------------------------------------------
 
 
-def collect(subject: Subject) -> Evidence:
-    """Make the compliance table of one program."""
-    return evidence_of(subject.files)
-
-
 def evidence_of(files: Mapping[str, str]) -> Evidence:
     """Make the compliance table of C and its headers."""
     if not installed():
@@ -167,20 +162,17 @@ def evidence_of(files: Mapping[str, str]) -> Evidence:
     return Evidence((figure,), tables, tuple(_shortfalls(made)))
 
 
-def _versions() -> dict[str, str]:
-    return {"cppcheck": engine() or ABSENT}
-
-
 KIND = Kind(
-    "compliance with MISRA C:2012, guideline by guideline, each deviation with its place", collect, _versions
+    "compliance with MISRA C:2012, guideline by guideline, each deviation with its place",
+    lambda subject: evidence_of(subject.files),
+    lambda: {"cppcheck": engine() or ABSENT},
 )
 
 
 def _shortfalls(made: Summary) -> Iterator[Shortfall]:
     for place in made.unexplained:
         yield Shortfall(
-            place.where,
-            f"violates {place.guideline or 'no guideline'}: {place.what} [{place.finding.check}]",
+            place.where, f"violates {place.guideline or 'no guideline'}: {place.what} [{place.finding.check}]"
         )
 
 
@@ -199,16 +191,8 @@ def _places(made: Summary) -> str:
     rows = [("guideline", "file", "line", "check", "finding", "reason")]
     for place in sorted(made.places, key=lambda one: (one.guideline, one.finding.file, one.finding.line)):
         reason = place.deviation.reason if place.deviation is not None else "VIOLATION"
-        rows.append(
-            (
-                place.guideline,
-                place.finding.file,
-                str(place.finding.line),
-                place.finding.check,
-                place.what,
-                reason,
-            )
-        )
+        found = place.finding
+        rows.append((place.guideline, found.file, str(found.line), found.check, place.what, reason))
     return csv_text(rows)
 
 
