@@ -7,9 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.views.evidence.misra.compliance import KIND, Compliance, Summary, main, summary
+from rcsc.views.evidence.misra.compliance import (
+    KIND,
+    Compliance,
+    Summary,
+    explained,
+    main,
+    own_findings,
+    summary,
+)
 from rcsc.views.evidence.misra.cppcheck import BASIC_TYPE, ENUMERATOR, HELD, Checked, Finding, check
-from rcsc.views.evidence.misra.deviations import explained, own_findings
 from rcsc.views.evidence.misra.guidelines import RULES, Category, guidelines
 from tests.evidence.subjects import EVERYTHING, subject_of
 

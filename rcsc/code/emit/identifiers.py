@@ -160,7 +160,8 @@ def names_of(program: Program, places: Mapping[str, str] = MappingProxyType({}),
         places: `Plan.places`; a file that is not there is called by its own name.
         prefix: `Plan.prefix`.
     """
-    file, p = _program_words(program, prefix)
+    file = plain_word(program.name)
+    p = file_word(file, prefix)
     failed = failed_words(len(checked(program)))
     c, module = _file_scope(program, p), NameScope(set(_MODULE))
     units = _units(program, p, places, prefix)
@@ -187,12 +188,6 @@ def names_in(plan: Plan) -> Names:
     return names_of(plan.program, plan.places, plan.prefix)
 
 
-def _program_words(program: Program, prefix: str) -> tuple[str, str]:
-    """Return the program's own word, and the one for its C names and files."""
-    own = plain_word(program.name)
-    return own, file_word(own, prefix)
-
-
 def plain_word(name: str) -> str:
     """Turn the name of a file or of a system into a word, cut if long."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII) or "program"
@@ -203,7 +198,7 @@ LONGEST_PREFIX = 18
 """Characters of a program's word, or a file's, up to which it stands before other names as it is."""
 
 
-def file_word(word: str, prefix: str = "") -> str:
+def file_word(word: str, prefix: str) -> str:
     """Return a word for C names and files: one that no library or tool reserves."""
     word = prefix + abbreviated(word, LONGEST_PREFIX - len(prefix))
     kept = word.lower() in _FILES | C_WORDS

@@ -147,7 +147,8 @@ def _matcher(program: Program, table: Table) -> Matcher:
     probes = [
         _leaf_probe(variables[name], by_leaf[name], everyone) for name in table.variables if name in by_leaf
     ]
-    probes += [_test_probe(truth, lines, everyone) for truth, lines in relational.values()]
+    for truth, lines in relational.values():  # where it fails, only lines that do not state it are left
+        probes.append(Probe(truth, (everyone & ~sum(1 << at for at in set(lines)), everyone)))
     one_word = len(table.lines) <= WORD
     groups = grouped(probes, FEW_GROUPED if one_word else MOST_GROUPED, shifted=one_word)
     return Matcher(len(table.lines), table.default is not None, groups)
@@ -185,9 +186,3 @@ def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int
             if not holds(box, start):
                 excluded[place] |= bit
     return Probe(index, tuple(everyone & ~mask for mask in excluded))
-
-
-def _test_probe(truth: Truth, lines: list[int], everyone: int) -> Probe:
-    """Return the masks of one test: the lines that do not state it, and all lines."""
-    stating = sum(1 << at for at in set(lines))
-    return Probe(truth, (everyone & ~stating, everyone))

@@ -101,8 +101,10 @@ class _Maker:
         self.tables: list[Origin] = []
         """Of each constant the table that it is made for."""
         self.lines: list[tuple[str, tuple[str, ...], Origin]] = []
+        externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
         self.modules = {
-            module: self.names.module.fresh(f"_{module.replace('.', '_')}") for module in self._modules()
+            module: self.names.module.fresh(f"_{module.replace('.', '_')}")
+            for module in dict.fromkeys(extern.partition(":")[0] for extern in externs)
         }
 
     def view(self) -> dict[str, object]:
@@ -136,10 +138,6 @@ class _Maker:
                 isinstance(node, Invoke) and node.function == "_single" for node in read(tuple(functions))
             ),
         }
-
-    def _modules(self) -> Iterator[str]:
-        externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
-        yield from dict.fromkeys(extern.partition(":")[0] for extern in externs)
 
     def _constant(self, wanted: str, rows: tuple[str, ...]) -> Name:
         """Add a tuple to the module; return its name."""

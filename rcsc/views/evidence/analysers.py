@@ -241,15 +241,12 @@ def _findings(tool: str, text: str) -> Iterator[Finding]:
         named = NAMED.match(match["text"])
         told, check = (named["what"], named["check"]) if named else (match["text"], "")
         if any(wrap in told for wrap in WRAPS):
-            check = "unsigned-shift-base" if "left shift" in told else _overflow(told)
+            sign = "unsigned" if told.startswith("unsigned") else "signed"
+            check = "unsigned-shift-base" if "left shift" in told else f"{sign}-integer-overflow"
         place = (match["file"], int(match["line"]), check)
         if place not in seen:
             seen.add(place)
             yield Finding(tool, *place, told)
-
-
-def _overflow(told: str) -> str:
-    return "unsigned-integer-overflow" if told.startswith("unsigned") else "signed-integer-overflow"
 
 
 # --- C that calls every function -------------------------------------------------------------

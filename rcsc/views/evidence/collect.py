@@ -53,7 +53,8 @@ def collect(
     Raises:
         BadDescription: A system is not in order.
     """
-    project = proved(_of_tables(settings))
+    tables = tables_in(settings.paths, tuple(systems_in(settings.paths)))
+    project = proved(replace(settings, paths=tables))
     report = project.report()
     if report.failed:
         return Conclusion(report, "no evidence was made: not everything is proved")
@@ -141,11 +142,6 @@ def _looked(subject: Subject, kind: str, progress: Callable[[str], None]) -> Evi
 
 def _whole(system: Whole, kind: str, progress: Callable[[str], None]) -> Evidence:
     return collect_whole(replace(system, progress=progress), kind)
-
-
-def _of_tables(settings: Settings) -> Settings:
-    """Return the settings with the programs of the systems' levels among the paths."""
-    return replace(settings, paths=tables_in(settings.paths, tuple(systems_in(settings.paths))))
 
 
 def _subject(program: ProvedProgram, found: CodeFound, settings: Settings) -> Subject:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from rcsc.base.host.tools import Absent, BuildFailed
 from rcsc.code.emit.identifiers import names_in
@@ -49,13 +50,9 @@ def _of(llvm: Tools, subject: Subject, document: VectorSet) -> Evidence:
         "coverage.txt": seen.text,
         "vectors.c": vectors,
         "vectors.json": as_json([vectors_document(document)]),
-        "missed.json": json.dumps([_told(each) for each in missed], indent=1) + "\n",
+        "missed.json": json.dumps([asdict(each) for each in missed], indent=1) + "\n",
     }
     return Evidence(_figures(llvm, document, seen, missed), files, tuple(_shortfalls(document, seen, missed)))
-
-
-def _told(missed: Missed) -> dict[str, object]:
-    return {name: getattr(missed, name) for name in ("function", "line", "what", "reason")}
 
 
 def _kind_of(missed: Missed) -> str:

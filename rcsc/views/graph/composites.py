@@ -139,7 +139,7 @@ def collapsed(chart: Chart, hidden: Collection[str]) -> Chart:
     gone = {
         each.name for each in chart.composites if any(set(each.states) < set(more.states) for more in outer)
     }
-    stand_in |= {name: stand_in[_of(chart, name).states[0]] for name in gone}
+    stand_in |= {name: stand_in[_states(chart, name)[0]] for name in gone}
     moved: dict[tuple[str, str, bool], list[ArrowLine]] = {}
     for arrow in chart.arrows:
         source, target = (stand_in.get(end, end) for end in (arrow.source, arrow.target))
@@ -255,10 +255,6 @@ def _rows(edges: Sequence[Edge], every: tuple[str, ...]) -> Iterator[ArrowLine]:
         own = tuple(group)
         sources = tuple(edge.source for edge in own)
         yield ArrowLine(line, () if set(sources) == set(every) else sources, own)
-
-
-def _of(chart: Chart, name: str) -> Composite:
-    return next(each for each in chart.composites if each.name == name)
 
 
 def _states(chart: Chart, name: str) -> tuple[str, ...]:

@@ -62,7 +62,11 @@ def tables(
     """
     file, name = _parted(named)
     if file is None:
-        return _by_name(name, load([_here()]), {os.path.realpath(root) for root in preferred})
+        return _by_name(
+            name,
+            load(["tables" if os.path.isdir("tables") else "."]),
+            {os.path.realpath(root) for root in preferred},
+        )
     if os.path.isdir(file):
         return _every(load([file]))
     loaded = load([file])
@@ -86,10 +90,6 @@ def _parted(named: str) -> tuple[str | None, str]:
         return named, ""
     file, colon, name = named.rpartition(":")
     return (file, name) if colon and file.endswith(".rcs") else (None, named)
-
-
-def _here() -> str:
-    return "tables" if os.path.isdir("tables") else "."
 
 
 def _programs(loaded: Loaded) -> Iterator[tuple[str, Program]]:

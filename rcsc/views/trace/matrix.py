@@ -22,6 +22,7 @@ from rcsc.lang.model import (
     Call,
     Invariant,
     Level,
+    Line,
     Procedure,
     ProcedureName,
     Program,
@@ -270,16 +271,10 @@ class _Build:
     def lines(self) -> Iterator[TracedLine]:
         """Yield every line of every table."""
         for table in self.plan.tables:
-            written = {str(line.name): line for line in table.table.lines}
-            for line in table.lines:
-                own = written.get(str(line.name))
-                tests = own.tests if own is not None else ()
+            for line, row in zip(table.lines, table.table.every_line, strict=True):
+                tests = row.tests if isinstance(row, Line) else ()
                 tested = {str(leaf) for test in tests if test is not None for leaf in test.variables}
-                span = self._row(table, line)
-                yield self._line(table, line, span, tested)
-
-    def _row(self, table: PlanTable, line: PlanLine) -> Span:
-        return next(one.span for one in table.table.every_line if one.name == line.name)
+                yield self._line(table, line, row.span, tested)
 
     def _line(self, table: PlanTable, line: PlanLine, span: Span, tested: set[str]) -> TracedLine:
         body = [action.statement for action in line.actions]

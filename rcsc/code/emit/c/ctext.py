@@ -130,14 +130,9 @@ def carried(expr: Expr) -> str:
         case model.Apply(op=Op.TO_INT, args=(arg,)) if isinstance(arg.type, Bool):
             return "uint32_t"
         case model.Apply(type=Int()):
-            return _working(expr)
+            return word_type(*_bounds((*expr.args, expr)))  # it holds operands and result
         case _:
             return c_type(expr.type)
-
-
-def _working(expr: model.Apply) -> str:
-    """Return the type in which a whole-numbered operation is done: it holds the bounds of operands and result."""
-    return word_type(*_bounds((*expr.args, expr)))
 
 
 def _bounds(exprs: Iterable[Expr]) -> tuple[int, int]:

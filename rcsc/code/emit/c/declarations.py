@@ -12,7 +12,7 @@ from rcsc.code.emit.plan import Origin, Sort, infrastructure, table_position
 from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.scope import c_scope
 from rcsc.lang import model
-from rcsc.lang.model import Enum, Int, Procedure, Real, Variable, pending, spell, unit_text
+from rcsc.lang.model import Enum, Int, Procedure, Real, pending, spell, unit_text
 
 TRACED = "tells what a cycle did"
 NUMBERED = "numbers what a cycle tells by its position"
@@ -173,13 +173,13 @@ def fields(c: CProgram) -> Iterator[Member]:
     variables = {v.name: v for v in c.program.variables}
     position = {v.name: at for at, v in enumerate(c.program.variables)}
     for variable in c.program.declared:
-        root = c.names.roots[variable.name]
+        root, leaf = c.names.roots[variable.name], variables[variable.leaves[0]]
         first, last = position[variable.leaves[0]], position[variable.leaves[-1]]
         where = f"{first}" if first == last else f"{first} to {last}"
         words = [
             f"{where}: {variable.kind.value}",
             range_text(variable.type),
-            _safe_text(variables[variable.leaves[0]]),
+            "" if leaf.safe is None else f"safe {spell(leaf.type, leaf.safe)}",
             comment(variable.doc),
         ]
         origin = Origin(Sort.VARIABLE, variable.name)
@@ -247,7 +247,3 @@ def range_text(kind: model.Type) -> str:
             return range_text(element)
         case _:
             return ""
-
-
-def _safe_text(variable: Variable) -> str:
-    return "" if variable.safe is None else f"safe {spell(variable.type, variable.safe)}"

@@ -44,8 +44,8 @@ class Digest:
 
 def digest(program: Program, names: Names) -> Digest:
     """Digest a program's meaning, and the layout of its state."""
-    lines = [f"{name} {kind}" for name, kind in _scalars(program, names)]
-    layout = hashlib.sha256("\n".join(lines).encode()).hexdigest()
+    scalars = (each for name, kind in members(program, names) for each in _flat(names, name, kind))
+    layout = hashlib.sha256("\n".join(map(" ".join, scalars)).encode()).hexdigest()
     return Digest(Digests(program).whole()[:16], layout[:16])
 
 
@@ -72,12 +72,8 @@ def members(program: Program, names: Names) -> Iterator[tuple[str, Type | str]]:
     yield from ((word, failed_type(len(checked(program)))) for word in names.failed)
 
 
-def _scalars(program: Program, names: Names) -> Iterator[tuple[str, str]]:
-    for name, kind in members(program, names):
-        yield from _flat(names, name, kind)
-
-
 def _flat(names: Names, path: str, kind: Type | str) -> Iterator[tuple[str, str]]:
+    """Yield each scalar of a member: its path and its C type."""
     match kind:
         case str():
             yield path, kind

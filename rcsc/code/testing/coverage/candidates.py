@@ -42,7 +42,6 @@ from rcsc.lang.model import (
     Program,
     Read,
     Real,
-    Scalar,
     Snapshot,
     Table,
     Value,
@@ -108,13 +107,10 @@ def _at_ends(program: Program) -> Iterator[Case]:
         yield Case(Entry("check"), ends, origin=f"every variable {which}")
         given: Snapshot = {**start, **{str(v.name): ends[v.name] for v in given_leaves}}
         yield from (Case(entry, given, origin=f"every input {which}") for entry in cycles)
-    zeros = {str(v.name): -0.0 for v in given_leaves if _has_zero(v.type)}
+    reals = [(str(v.name), v.type) for v in given_leaves if isinstance(v.type, Real)]
+    zeros = {name: -0.0 for name, kind in reals if kind.low <= 0 <= kind.high}
     for entry in cycles[:1] if zeros else ():
         yield Case(entry, {**start, **zeros}, origin="inputs of -0.0, which is taken as 0.0")
-
-
-def _has_zero(kind: Scalar) -> bool:
-    return isinstance(kind, Real) and kind.low <= 0 <= kind.high
 
 
 def _unsafe(program: Program) -> Snapshot:

@@ -166,8 +166,8 @@ class Finder:
 
     def default(self) -> Snapshot | Missing:
         """A snapshot that no line matches."""
-        none: list[Wanted] = [(_all(line), False) for line in self.table.lines]
-        return self.find((*self.given, *none))
+        tests = ([(test, True) for test in line.tests if test is not None] for line in self.table.lines)
+        return self.find((*self.given, *((conjunction(line), False) for line in tests)))
 
     def pair(self, line: Line, test: Test, atom: int) -> tuple[Snapshot, Snapshot, _Pair] | str:
         """The two snapshots of one condition, or the reason why there are none."""
@@ -190,10 +190,6 @@ class Finder:
         return "ranges"
 
 
-def _all(line: Line) -> Expr:
-    return conjunction([(test, True) for test in line.tests if test is not None])
-
-
 def given_in(program: Program, table: Table) -> tuple[Wanted, ...]:
     """What every vector must satisfy: the table's assumptions and the program's invariants."""
     used = [a.condition for a in program.assumptions if a.name in table.assumptions]
@@ -213,12 +209,7 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
     unshown: list[Unshown] = []
     conditions = shown = 0
     for line in table.lines if lines is None else lines:
-        reached = finder.reach(line)
-        if isinstance(reached, Missing):
-            reason = "not found" if reached is Missing.UNKNOWN else "ranges"
-            unshown.append(Unshown(table.name, line.name, "", "", reason))
-        else:
-            vectors.append(Vector(table.name, line.name, "", "", "reach", finder.name_at(reached), reached))
+        _reached(finder, str(line.name), finder.reach(line), vectors, unshown)
         for column, test in _stated(table, line):
             for number, atom in enumerate(atoms(test)):
                 conditions += 1
@@ -234,7 +225,7 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
                     purpose = str(truth).lower()
                     vectors.append(Vector(table.name, line.name, column, text, purpose, named, snapshot))
     if table.default is not None and lines is None:
-        _default_vector(finder, str(table.default.name), vectors, unshown)
+        _reached(finder, str(table.default.name), finder.default(), vectors, unshown)
     return Vectors(table.name, conditions, shown, tuple(vectors), tuple(unshown))
 
 
@@ -245,10 +236,13 @@ def _stated(table: Table, line: Line) -> Iterator[tuple[str, Test]]:
             yield column.heading, test
 
 
-def _default_vector(finder: Finder, name: str, vectors: list[Vector], unshown: list[Unshown]) -> None:
-    table, snapshot = finder.table, finder.default()
-    if not isinstance(snapshot, Missing):
-        vectors.append(Vector(table.name, name, "", "", "reach", finder.name_at(snapshot), snapshot))
+def _reached(
+    finder: Finder, name: str, found: Snapshot | Missing, vectors: list[Vector], unshown: list[Unshown]
+) -> None:
+    """Add the vector that takes a line, or why there is none."""
+    table = finder.table.name
+    if isinstance(found, Missing):
+        reason = "not found" if found is Missing.UNKNOWN else "ranges"
+        unshown.append(Unshown(table, name, "", "", reason))
     else:
-        reason = "not found" if snapshot is Missing.UNKNOWN else "ranges"
-        unshown.append(Unshown(table.name, name, "", "", reason))
+        vectors.append(Vector(table, name, "", "", "reach", finder.name_at(found), found))

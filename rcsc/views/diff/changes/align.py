@@ -216,10 +216,14 @@ def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
         "enumeration",
         *({n: members for n, members in enum.items() if all(n in e for e in enums)} for enum in enums),
     )
-    yield from _changed(
+    yield from _changed(  # the leaf of a deferred value is declared with its variable
         "variable",
         *(
-            {str(v.name): _declared(v) for v in p.variables if not _is_pending(v) and v.name not in own}
+            {
+                str(v.name): _declared(v)
+                for v in p.variables
+                if not v.name.endswith(".next") and v.name not in own
+            }
             for p, own in zip((before, after), added, strict=True)
         ),
     )
@@ -229,11 +233,6 @@ def _changed(what: str, before: Mapping[str, str], after: Mapping[str, str]) -> 
     for name in dict.fromkeys((*before, *after)):
         if before.get(name, "") != after.get(name, ""):
             yield Declaration(f"{what} `{name}`", before.get(name, ""), after.get(name, ""))
-
-
-def _is_pending(variable: Variable) -> bool:
-    """Return whether the variable is the leaf of a deferred value: declared with its variable."""
-    return variable.name.endswith(".next")
 
 
 def _declared(variable: Variable) -> str:

@@ -17,7 +17,6 @@ from rcsc.lang.model import (
     Op,
     Program,
     Real,
-    Scalar,
     Statement,
     Table,
     earlier,
@@ -222,10 +221,7 @@ class Versions:
         return space.cover(wanted, allowed, most, self.spare), space.volume(space.nodes)
 
     def _words(self, cover: Cover) -> tuple[tuple[str, ...], ...]:
-        return tuple(region(self._kinds_of(box), box) for box in cover.boxes)
-
-    def _kinds_of(self, box: Region) -> dict[str, Scalar]:
-        return {name: self.seen[name].kind for name in box}
+        return tuple(region({name: self.seen[name].kind for name in box}, box) for box in cover.boxes)
 
     def inside(self, boxes: Iterable[Region]) -> Node:
         """Return the condition that an input lies in one of the boxes."""

@@ -14,5 +14,5 @@ deviations elsewhere is a violation until somebody explains it.
 Trusted: cppcheck and its add-on, whose own list says which rules they look at. What it costs: some ten seconds a program.
 
 Modules: `guidelines` (numbers, categories, what the checked rules are about), `cppcheck` (the checker),
-`deviations` (places and reasons), `compliance` (the table).
+`compliance` (places and reasons, and the table).
 """

@@ -101,10 +101,6 @@ def check(files: Mapping[str, str], *options: str) -> Checked:
         files: Texts by path; they are put into one folder.
         options: More of cppcheck's, such as `--inline-suppr` for C that says by itself where it deviates.
     """
-    rules = {
-        **dict.fromkeys(_core_rules(), "cppcheck itself, which sees part of it"),
-        **dict.fromkeys(_addon_rules(), "cppcheck's MISRA add-on"),
-    }
     with scratch("misra") as place:
         sources = write_c(files, place)
         command = [sys.executable, "-c", _RUN, *_OPTIONS, *options]
@@ -116,7 +112,7 @@ def check(files: Mapping[str, str], *options: str) -> Checked:
     failures += [f"cppcheck: {one.file}:{one.line}: {one.text}" for one in found if one.check in BROKEN]
     if not told >= TELLS:
         failures.append("cppcheck and its add-on tell nothing of planted violations")
-    return Checked(engine() or PACKAGE, rules, found, "; ".join(failures))
+    return Checked(engine() or PACKAGE, _rules(), found, "; ".join(failures))
 
 
 @cache
@@ -132,19 +128,15 @@ def _findings(output: str) -> Iterator[Finding]:
             yield Finding(file, int(rest[0]), rest[2], rest[3], error=rest[1] == "error")
 
 
-def _addon() -> str:
-    """Return the text of the installed add-on, which lists the rules that it checks."""
+def _rules() -> dict[str, str]:
+    """Return the rules that are checked, each with the checker; the installed add-on lists its own and those that it leaves."""
     spec = importlib.util.find_spec(PACKAGE)
     folders = [Path(folder) for folder in (spec.submodule_search_locations or ())] if spec is not None else []
     found = next((path for folder in folders for path in folder.rglob("misra.py")), None)
-    return "" if found is None else read.text(found)
-
-
-def _addon_rules() -> Iterator[str]:
-    for number in re.findall(r"executeCheck\((\d+),", _addon()):
-        yield f"{int(number) // 100}.{int(number) % 100}"
-
-
-def _core_rules() -> Iterator[str]:
-    listed = _addon().partition("def getCppcheckRules")[2].partition("]")[0]
-    yield from re.findall(r"'(\d+\.\d+)'", listed)
+    addon = "" if found is None else read.text(found)
+    core = re.findall(r"'(\d+\.\d+)'", addon.partition("def getCppcheckRules")[2].partition("]")[0])
+    own = (divmod(int(number), 100) for number in re.findall(r"executeCheck\((\d+),", addon))
+    return {
+        **dict.fromkeys(core, "cppcheck itself, which sees part of it"),
+        **{f"{section}.{at}": "cppcheck's MISRA add-on" for section, at in own},
+    }

@@ -119,7 +119,7 @@ class _Reader:
 
     def graph(self) -> None:
         """Read the whole text."""
-        self._skip_word("strict")
+        self.at += self._now().kind == "name" and self._now().text.lower() == "strict"
         begun = self._take("name")
         if begun.text.lower() != "digraph":
             raise UnreadableError("a state graph is a `digraph`", begun.offset)
@@ -208,9 +208,6 @@ class _Reader:
         present = self._now() == _Token("mark", mark, self._now().offset)
         self.at += present
         return present
-
-    def _skip_word(self, word: str) -> None:
-        self.at += self._now().kind == "name" and self._now().text.lower() == word
 
     def _take(self, kind: str, text: str = "") -> _Token:
         token = self._now()

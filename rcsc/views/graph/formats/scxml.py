@@ -60,7 +60,8 @@ def read(text: str) -> StateGraph:
         root = xml_of(text)
     except Malformed as error:
         what, row, column = error.args
-        raise UnreadableError(what, _offset(text, row) + column) from error
+        before = text.splitlines(keepends=True)[: row - 1]
+        raise UnreadableError(what, sum(map(len, before)) + column) from error
     if root.tag != f"{{{SCXML}}}scxml":
         raise UnreadableError("the outermost element is not `scxml`")
     attributes = {
@@ -76,10 +77,6 @@ def read(text: str) -> StateGraph:
     for state in states:
         reader.state(state, ANY if whole else state.get("id", ""))
     return finished({word: value for word, value in attributes.items() if value}, reader.drawn)
-
-
-def _offset(text: str, row: int) -> int:
-    return sum(len(line) for line in text.splitlines(keepends=True)[: row - 1])
 
 
 class _Reader:
