@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from types import MappingProxyType
+from typing import TypeAlias
 
 from rcsc.code.emit.plan import Plan
 from rcsc.code.emit.scope import NameScope, abbreviated, c_scope, short
@@ -81,6 +82,9 @@ def comment(text: str) -> str:
     for mark in ("*/", "/*", "//", "${", "-suppress", "coding:", "coding=", "NOLINT"):
         clean = clean.replace(mark, f"{mark[:-1]} {mark[-1]}")
     return clean.replace('"', "'")
+
+
+Words: TypeAlias = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,15 +344,7 @@ def _constants(program: Program, units: Mapping[str, str], scope: NameScope) -> 
 
 def _positions(
     program: Program, p: str, scope: NameScope
-) -> tuple[
-    dict[str, tuple[str, ...]],
-    tuple[str, ...],
-    tuple[str, ...],
-    tuple[str, ...],
-    dict[str, str],
-    tuple[str, ...],
-    dict[str, str],
-]:
+) -> tuple[dict[str, Words], Words, Words, Words, dict[str, str], Words, dict[str, str]]:
     """Name the constants of positions in the trace.
 
     Lines of each table, assumptions that are checked, faults, variables, invariants, tables that others follow.

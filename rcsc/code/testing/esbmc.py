@@ -142,8 +142,6 @@ def harness(
 ) -> str:
     """The C text that states what is to be proved of one function, where `confined` says more of its inputs."""
     struct, name = symbols.struct, reference_of(target)
-    top = [f'#include "{symbols.header}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
-    top += ["int main(void) {", f"{struct} a; arbitrary(&a);"]
     call = call_of(symbols, target, "&a")
     if is_matcher(target):
         body = [f"__ESBMC_assume(ref_ranges(&a, 1)); __ESBMC_assume(ref_t{target.number}_safe(&a));", *call]
@@ -154,7 +152,14 @@ def harness(
         body = [KNOWN, *confined]
         body += [f"{struct} b = a; const ref_trace_t r = {name}(&b);"]
         body += [AGAIN, *call, "rcsc_calls();", *_claims(program, symbols), *_trace_claims(program, symbols)]
-    return "\n".join([*top, *body, "return 0; }"]) + "\n"
+    return _file(program, symbols, symbols.header, body)
+
+
+def _file(program: Program, symbols: Symbols, included: str, body: Sequence[str]) -> str:
+    """Return a C file whose `main` begins with a state `a` of which nothing is known."""
+    parts = [f'#include "{included}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
+    parts += ["int main(void) {", f"{symbols.struct} a; arbitrary(&a);", *body, "return 0; }"]
+    return "\n".join(parts) + "\n"
 
 
 STEPS = (
@@ -184,8 +189,6 @@ def part_harness(
     line in that position are looked at; of the position after the last, that there is none.
     """
     struct = symbols.struct
-    top = [f'#include "{symbols.source}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
-    top += ["int main(void) {", f"{struct} a; arbitrary(&a); {KNOWN}"]
     same = list(_claims(program, symbols))
     if part == "admit":
         body = [f"{struct} b = a; const int32_t refused = ref_admit(&b);"]
@@ -204,7 +207,7 @@ def part_harness(
             body += [f"__ESBMC_assume(ref_t{target.number}_safe(&a));"]
             body += [f"const int32_t at = ref_t{target.number}_line(&a);"]
             body += [f'__ESBMC_assert(at >= 0 && at < {line}, "exactly one line");']
-            return "\n".join([*top, *body, "return 0; }"]) + "\n"
+            return _file(program, symbols, symbols.source, [KNOWN, *body])
         if line is not None:
             defined = f"ref_t{target.number}_safe(&a)"
             body += [f"__ESBMC_assume({defined} && ref_t{target.number}_line(&a) == {line});"]
@@ -212,7 +215,7 @@ def part_harness(
         body += [f"ref_t{target.number}_body(&b, &r);"]
         body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
         body += list(_trace_claims(program, symbols))
-    return "\n".join([*top, *body, "return 0; }"]) + "\n"
+    return _file(program, symbols, symbols.source, [KNOWN, *body])
 
 
 def case_harness(program: Program, symbols: Symbols, target: ComparedFunction, value: Value | None) -> str:

@@ -89,6 +89,11 @@ def _disagreement(program: Program, disagreement: Disagreement, table: Table | N
     return Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(program, table), notes=notes)
 
 
+def _failed(program: Program, message: str, build: BuildFailed) -> Diagnostic:
+    notes = tuple(build.text.splitlines())
+    return Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(program), notes=notes)
+
+
 def _samples(table: Table, options: SuiteOptions) -> list[Line] | None:
     """The lines that vectors are made for: None for all of them."""
     if len(table.lines) <= LARGE:
@@ -157,10 +162,7 @@ class Suite:
             return f"not run: {result.reason}"
         if isinstance(result, BuildFailed):
             message = f"the C executor of `{self.program.name}` stopped under the sanitizers"
-            notes = tuple(result.text.splitlines())
-            self.diagnostics.append(
-                Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(self.program), notes=notes)
-            )
+            self.diagnostics.append(_failed(self.program, message, result))
             return "stopped"
         if result is not None:
             self.diagnostics.append(_disagreement(self.program, result, None))
@@ -324,8 +326,7 @@ def run_suite(
     if isinstance(native, Absent):
         return SuiteResult((), (Diagnostic(Code.NO_C_COMPILER, native.reason, _place(program)),))
     message = f"the C generated from `{program.name}` does not compile"
-    notes = tuple(native.text.splitlines())
-    return SuiteResult((), (Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(program), notes=notes),))
+    return SuiteResult((), (_failed(program, message, native),))
 
 
 def _run(

@@ -76,6 +76,10 @@ def _besides(where: Where) -> str:
     return "" if where.exact else f"{len(where.boxes)} boxes of more"
 
 
+def _input(change: Change) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in change.witness)
+
+
 def _title(part: ComparedPart, change: Change) -> str:
     if change.sort is PartSort.CONDITION:
         return f"was {change.before}, is {change.after}"
@@ -83,13 +87,8 @@ def _title(part: ComparedPart, change: Change) -> str:
         return "another effect"
     if change.before == change.after:
         return f"{change.before}: another effect"
-    effect = {
-        PartSort.EFFECT: "another effect",
-        PartSort.LINE: "the same effect",
-        PartSort.FAULT: "",
-        PartSort.CONDITION: "",
-    }
-    return f"{change.before} -> {change.after}" + (f": {effect[change.sort]}" if effect[change.sort] else "")
+    effect = {PartSort.EFFECT: ": another effect", PartSort.LINE: ": the same effect"}.get(change.sort, "")
+    return f"{change.before} -> {change.after}{effect}"
 
 
 def _left(value: Value) -> str:
@@ -198,11 +197,7 @@ def _change(part: ComparedPart, change: Change) -> Iterator[Row]:
     if _besides(change.where):
         yield (TextPiece(f"      {_besides(change.where)}", Style.WITNESS),)
     if change.witness and change.sort is not PartSort.LINE:
-        yield (
-            TextPiece(
-                f"      {'least' if change.least else 'input'}  {', '.join(f'{name} = {value}' for name, value in change.witness)}"
-            ),
-        )
+        yield (TextPiece(f"      {'least' if change.least else 'input'}  {_input(change)}"),)
     for value in change.values:
         heading = f"  [{', '.join(value.headings)}]" if value.headings else ""
         yield (TextPiece(f"      {value.leaf or 'the run'}: {_left(value)}{heading}"),)
@@ -338,8 +333,7 @@ def _details(part: ComparedPart, change: Change) -> Iterator[str]:
         text = f"{'; '.join(_boxes(change.where))} {_besides(change.where)}"
         yield f"- {title}: {_cell(text)}".rstrip()
     elif change.witness:
-        text = ", ".join(f"{name} = {value}" for name, value in change.witness)
-        yield f"- {title}: {_cell(text)}"
+        yield f"- {title}: {_cell(_input(change))}"
     yield from (
         f"  - {_code(value.leaf)}: {_cell(str(value.at[0]))} → {_cell(str(value.at[1]))}"
         for value in change.values

@@ -82,7 +82,6 @@ class Measured:
 
     Attributes:
         branches, decisions, regions: In the order of the file.
-        lines: Lines with a statement, and those that ran.
         text: The file as llvm-cov prints it, with counts.
         played: The output of the program that played the vectors.
         passed: Whether all of them gave the right result.
@@ -91,7 +90,6 @@ class Measured:
     branches: tuple[Point, ...]
     decisions: tuple[Decision, ...]
     regions: tuple[Region, ...]
-    lines: tuple[int, int]
     text: str
     played: str
     passed: bool
@@ -133,25 +131,12 @@ def measured(llvm: Tools, files: Mapping[str, str], source: str, vectors: str) -
         others = [name for name in write_c(files, place) if name != source]
         (place / "vectors.c").write_text(vectors, "utf-8")
         shutil.copyfile(PROFILE, place / "profile.c")
-        play = [
-            llvm.clang,
-            "-std=gnu11",
-            "-O1",
-            "-w",
-            "-o",
-            "play",
-            "measured.o",
-            "profile.c",
-            "vectors.c",
-            *others,
-        ]
+        measuring = ["-std=c99", "-O1", "-w", *MEASURED]
+        play = "-std=gnu11 -O1 -w -o play measured.o profile.c vectors.c".split()
         said = list[Ran]()
         for command, made in (
-            (
-                [llvm.clang, "-std=c99", "-O1", "-w", *MEASURED, "-c", source, "-o", "measured.o"],
-                "measured.o",
-            ),
-            (play, "play"),
+            ([llvm.clang, *measuring, "-c", source, "-o", "measured.o"], "measured.o"),
+            ([llvm.clang, *play, *others], "play"),
             ([str(place / "play")], "vectors.profraw"),
             ([llvm.profdata, "merge", "-o", "vectors.profdata", "vectors.profraw"], "vectors.profdata"),
             ([llvm.cov, "show", *profile, "--show-mcdc", "--show-branches=count"], ""),
@@ -193,12 +178,10 @@ def _read(data: Mapping[str, Any], text: str, shown: str, played: str, passed: b
         regions += (
             Region(name, r[0], lines[r[0] - 1][r[1] - 1 :], r[4]) for r in function["regions"] if r[7] == CODE
         )
-    counted = data["files"][0]["summary"]["lines"]
     return Measured(
         tuple(sorted(branches, key=lambda b: (b.line, b.column))),
         tuple(sorted(decisions, key=lambda d: (d.line, d.column))),
         tuple(sorted(regions, key=lambda r: r.line)),
-        (counted["count"], counted["covered"]),
         shown,
         played,
         passed,

@@ -30,9 +30,8 @@ def collect(subject: Subject) -> Evidence:
     )
     unknown = [verdict.function for verdict in verdicts if verdict.answer is not EsbmcAnswer.PROVED]
     named = (f"not, or in part: {', '.join(unknown)}",) if unknown else ()
-    return Evidence(
-        (figure, *named), {"model-check.md": "\n".join(_page(verdicts))}, tuple(_shortfalls(verdicts))
-    )
+    page = {"model-check.md": "\n".join(_page(verdicts))}
+    return Evidence((figure, *named), page, tuple(_shortfalls(verdicts)))
 
 
 def _verdicts(subject: Subject) -> Iterator[EsbmcVerdict]:

@@ -270,15 +270,8 @@ def _codes(board: Board, place: Path, compiled_file: str) -> dict[str, int]:
 def _alone(board: Board, place: Path, function: str) -> int | None:
     """Return the bytes of code and constants of an image with one function and its needs, the compiler's library included."""
     objects = [path.name for path in sorted(place.glob("*.o")) if path.name not in {"image.o", "copies.o"}]
-    made = link(
-        board,
-        place,
-        objects,
-        "alone.elf",
-        "-Wl,--gc-sections",
-        f"-Wl,-e,{function}",
-        "-Wl,--unresolved-symbols=ignore-all",
-    )
+    alone = ("-Wl,--gc-sections", f"-Wl,-e,{function}", "-Wl,--unresolved-symbols=ignore-all")
+    made = link(board, place, objects, "alone.elf", *alone)
     if isinstance(made, BuildFailed):
         return None
     said = run_command([f"{board.tools}size", "alone.elf"], place, TOOL_S).out.splitlines()

@@ -1,13 +1,13 @@
 """A matrix as CSV and as JSON, in both directions: from lines to code, tests and proofs, and from code to lines."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from rcsc import __version__
 from rcsc.base.host.files import csv_text
 from rcsc.base.host.files.plain import plain
 from rcsc.code.emit.rendering import Piece
-from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
+from rcsc.views.trace.matrix import Matrix, TracedLine
 from rcsc.views.trace.requirements import standings
 
 FORM = 3
@@ -116,7 +116,7 @@ def _program(matrix: Matrix) -> dict[str, Any]:
             for name, proof in matrix.tables.items()
         ],
         "lines": [dict(_line(matrix, line)) for line in matrix.lines],
-        "declared": [_declared(one) for one in matrix.declared],
+        "declared": [plain(one) for one in matrix.declared],
         "code": [dict(_piece(matrix, piece)) for piece in matrix.pieces],
         "untraced": list(matrix.untraced),
     }
@@ -158,15 +158,3 @@ def _piece(matrix: Matrix, piece: Piece) -> Iterator[tuple[str, object]]:
     if place := matrix.place(piece.origin):
         yield "place", place
     yield "requirements", list(matrix.answers(piece.origin))
-
-
-def _declared(one: Declared) -> Mapping[str, object]:
-    return {
-        "sort": one.sort,
-        "name": one.name,
-        "place": one.place,
-        "requirements": list(one.requirements),
-        "states": one.states,
-        "used": list(one.used),
-        "proof": one.proof,
-    }

@@ -124,10 +124,8 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
         *names.leaves.values(),
         *names.invariants,
         *names.places.values(),
-        *names.checks,
-        names.digest,
-        names.layout,
     ]
+    own += [*names.checks, names.digest, names.layout]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
     for unit, declared in shared(c).items():
         yield from ((name, f"a name of the types of `{unit}`") for name in declared)

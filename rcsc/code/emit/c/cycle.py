@@ -249,11 +249,5 @@ def init_function(c: CProgram) -> Function:
     """Return the function that makes the initial state."""
     values = (assigned(c, variable, variable.initial) for variable in c.program.variables)
     digest = Set(MemberPath((DIGEST,)), Name(c.names.digest))
-    return on_state(
-        c,
-        "Every variable's initial value.",
-        "init",
-        digest,
-        *trace(c, fault_name(c, Fault.OK), NONE),
-        *values,
-    )
+    begun = trace(c, fault_name(c, Fault.OK), NONE)
+    return on_state(c, "Every variable's initial value.", "init", digest, *begun, *values)

@@ -163,8 +163,8 @@ class Reached:
         procedures = {str(procedure.name): procedure for procedure in self.program.procedures}
         for number, answer in enumerate(case.answers, 1):
             for name, value in zip(procedures[answer.procedure].writes, answer.values, strict=True):
-                beyond = side(self.program.variable(name), value)
                 variable = self.program.variable(name)
+                beyond = side(variable, value)
                 near = (*ends_of(variable.type), *outside_of(variable, "int64_t").values())
                 yield ("given", answer.procedure, name, beyond, value in near and value)
                 if right.result == Fault.EXTERN and number == len(case.answers):

@@ -45,21 +45,9 @@ from rcsc.lang.model import (
 from rcsc.lang.operator_table import is_logic
 
 INFIX = {
-    Op.EQ: "==",
-    Op.NE: "!=",
-    Op.LT: "<",
-    Op.LE: "<=",
-    Op.GT: ">",
-    Op.GE: ">=",
-    Op.ADD: "+",
-    Op.SUB: "-",
-    Op.MUL: "*",
-    Op.DIV: "/",
-    Op.MOD: "%",
-    Op.AND: "&&",
-    Op.OR: "||",
-    Op.XOR: "!=",
-}
+    Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=", Op.XOR: "!=", Op.AND: "&&", Op.OR: "||",
+    Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
+}  # fmt: skip
 
 WIDTHS = (("int64_t", 63), ("ref_wide", 127))
 

@@ -48,10 +48,13 @@ def traces(versions: Versions) -> Iterator[Traces]:
     Raises:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
     """
+    yield from (_level(versions, pair) for pair in _in_both(versions))
+
+
+def _in_both(versions: Versions) -> list[tuple[Level, Level]]:
+    """Return the levels that both versions have."""
     later = {level.name: level for level in versions.after.levels}
-    for level in versions.before.levels:
-        if level.name in later:
-            yield _level(versions, (level, later[level.name]))
+    return [(level, later[level.name]) for level in versions.before.levels if level.name in later]
 
 
 def _level(versions: Versions, pair: tuple[Level, Level]) -> Traces:
@@ -152,19 +155,15 @@ def _trace(steps: Iterable[GraphStep], first: str, last: str, then: GraphStep) -
 
 def follows(versions: Versions) -> Iterator[Follows]:
     """Yield every table that both versions have and a level runs, where its pairs may differ."""
-    later = {level.name: level for level in versions.after.levels}
-    for level in versions.before.levels:
-        if level.name not in later:
-            continue
-        pair = level, later[level.name]
-        around = _around(versions.digests[0], level) != _around(versions.digests[1], pair[1])
+    for pair in _in_both(versions):
+        around = _around(versions.digests[0], pair[0]) != _around(versions.digests[1], pair[1])
         tables = [run_by(side.program, version) for side, version in zip(versions.digests, pair, strict=True)]
         for name, table in tables[0].items():
             later_table = tables[1].get(name)
             if later_table is not None and (
                 around or versions.digests[0].table(table) != versions.digests[1].table(later_table)
             ):
-                yield _compared(versions, level.name, table, later_table)
+                yield _compared(versions, pair[0].name, table, later_table)
 
 
 def _around(digests: Digests, level: Level) -> object:

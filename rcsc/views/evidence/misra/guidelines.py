@@ -31,18 +31,15 @@ class Guideline:
     category: Category
 
 
-_DIRECTIVES = {
-    "1": (1, ""), "2": (1, ""), "3": (1, ""), "4": (14, "2 4 5 6 8 9 13"),
-}  # fmt: skip
-"""The number of directives in each section, and those of them that are advisory."""
-_RULES = {
+_SECTIONS = {
+    "Dir 1": (1, "", ""), "Dir 2": (1, "", ""), "Dir 3": (1, "", ""), "Dir 4": (14, "2 4 5 6 8 9 13", ""),
     "1": (4, "2", ""), "2": (7, "3 4 5 6 7", ""), "3": (2, "", ""), "4": (2, "2", ""), "5": (9, "9", ""), "6": (2, "", ""),
     "7": (4, "", ""), "8": (14, "7 9 11 13", ""), "9": (5, "", "1"), "10": (8, "5", ""), "11": (9, "4 5", ""),
     "12": (5, "1 3 4", "5"), "13": (6, "3 4", "6"), "14": (4, "", ""), "15": (7, "1 4 5", ""), "16": (7, "", ""),
     "17": (8, "5 8", "3 4 6"), "18": (8, "4 5", ""), "19": (2, "2", "1"), "20": (14, "1 5 10", ""),
     "21": (21, "12", "13 17 18 19 20"), "22": (10, "", "2 4 5 6"),
 }  # fmt: skip
-"""The number of rules in each section, those of them that are advisory, and those that are mandatory."""
+"""The number of directives or rules in each section, those of them that are advisory, and those that are mandatory."""
 
 
 def guidelines() -> Iterator[Guideline]:
@@ -53,11 +50,7 @@ def guidelines() -> Iterator[Guideline]:
     >>> [one.number for one in guidelines() if one.category is Category.MANDATORY][:3]
     ['9.1', '12.5', '13.6']
     """
-    for section, (count, advisory) in _DIRECTIVES.items():
-        for at in range(1, count + 1):
-            kind = Category.ADVISORY if str(at) in advisory.split() else Category.REQUIRED
-            yield Guideline(f"Dir {section}.{at}", kind)
-    for section, (count, advisory, mandatory) in _RULES.items():
+    for section, (count, advisory, mandatory) in _SECTIONS.items():
         for at in range(1, count + 1):
             kind = Category.ADVISORY if str(at) in advisory.split() else Category.REQUIRED
             kind = Category.MANDATORY if str(at) in mandatory.split() else kind

@@ -39,17 +39,9 @@ class ReadArrow:
 
     def edge(self) -> Edge:
         """Return the arrow as an edge of a state graph."""
-        attributes = self.attributes
-        return Edge(
-            attributes.get("line", "").strip(),
-            self.source,
-            self.target,
-            attributes.get("when", "").strip(),
-            attributes.get("does", "").strip(),
-            attributes.get("decided", "").strip(),
-            attributes.get("default", "").strip(),
-            offset=self.offset,
-        )
+        words = ("line", "when", "does", "decided", "default")
+        line, guard, effect, decided, default = (self.attributes.get(word, "").strip() for word in words)
+        return Edge(line, self.source, self.target, guard, effect, decided, default, offset=self.offset)
 
 
 def finished(attributes: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
