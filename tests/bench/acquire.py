@@ -11,7 +11,7 @@ from statistics import median
 from tempfile import TemporaryDirectory
 
 from rcsc.base.host.tools import BuildFailed, run_command
-from rcsc.code.testing.boards import BOARDS, Board, harness, link, run_image
+from rcsc.code.testing.boards import BOARDS, HARNESS, Board, link, run_image
 
 REPO = Path(__file__).parents[2]
 CASES = 3000
@@ -112,7 +112,7 @@ def compared(board: Board, place: Path) -> Compared:
     files = {path.name: path.read_text("utf-8") for path in (REPO / "generated/c").glob("*.h")}
     files["task.c"] = (REPO / "generated/c/task.c").read_text("utf-8")
     files["switch.c"] = (REPO / "tests/bench/acquire_switch.c").read_text("utf-8")
-    said = run_image(board, place, files, harness() + MAIN % (DRAWN, CASES))
+    said = run_image(board, place, files, HARNESS + MAIN % (DRAWN, CASES))
     assert isinstance(said, str), said
     rows = re.findall(r"case (\d+) (\d+) (\d+) ([01])", said)
     cases = tuple((int(line) - 1, int(a), int(b), same == "1") for line, a, b, same in rows)

@@ -291,5 +291,5 @@ WORDS = {
 @pytest.mark.parametrize(("board", "deep"), [("Cortex-M3", (3, 24)), ("RV32IMAC", (4, 24))])
 def test_what_is_known_is_counted_exactly(board: str, deep: tuple[int, int], tmp_path: Path) -> None:
     words = "".join(f'#define {name} "{text}"\n' for name, text in WORDS[board].items())
-    said = boards.run_image(ALL[board], tmp_path, {}, boards.harness() + words + KNOWN)
+    said = boards.run_image(ALL[board], tmp_path, {}, boards.HARNESS + words + KNOWN)
     assert said == f"rcsc five 100 5 0\nrcsc deep 100 {deep[0]} {deep[1]}\n"

@@ -16,8 +16,6 @@ from rcsc.base.host.tools import BuildFailed, run_command, write_c
 
 OPTIMIZED = ("-std=c99", "-Os", "-ffreestanding", "-ffunction-sections", "-fdata-sections")
 COMPILE_S, RUN_S = 60.0, 300.0
-PAINTED = 1024
-"""Words below a call in which its stack is looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,84 +103,84 @@ HARNESS = """
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
-#define PAINTED {painted}u
+#define PAINTED 1024u /* words below a call in which its stack is looked for */
 typedef void (*call_t)(void *state);
 int main(void);
 static uint32_t stack[8192] __attribute__((aligned(16), used));
 #if defined(__riscv)
 __attribute__((naked, section(".reset"), used)) void reset(void)
-{{
+{
     __asm volatile("la sp, stack + 32768\\n\\tj start");
-}}
+}
 static uint32_t now(void)
-{{
+{
     uint32_t n;
     __asm volatile(".option push\\n\\t.option arch, +zicsr\\n\\tcsrr %0, minstret\\n\\t.option pop" : "=r"(n));
     return n;
-}}
-static uint32_t passed(uint32_t from, uint32_t to) {{ return to - from; }}
-static void begin(void) {{ }}
-static uint32_t lost(void) {{ return 0u; }}
+}
+static uint32_t passed(uint32_t from, uint32_t to) { return to - from; }
+static void begin(void) { }
+static uint32_t lost(void) { return 0u; }
 #define STACK_POINTER "sp"
 static void ask(uintptr_t what, uintptr_t with)
-{{
+{
     register uintptr_t a0 __asm("a0") = what;
     register uintptr_t a1 __asm("a1") = with;
     __asm volatile(".balign 16\\n\\t.option push\\n\\t.option norvc\\n\\t"
                    "slli x0, x0, 0x1f\\n\\tebreak\\n\\tsrai x0, x0, 7\\n\\t.option pop"
                    : "+r"(a0) : "r"(a1) : "memory");
-}}
+}
 #else
 #define SYSTICK ((volatile uint32_t *)0xE000E010u)
 void reset(void);
 static void fault(void);
-__attribute__((section(".vectors"), used)) static const void *const vectors[16] = {{
-    &stack[8192], (const void *)reset, (const void *)fault, (const void *)fault}};
-static uint32_t now(void) {{ return SYSTICK[2]; }}
-static uint32_t passed(uint32_t from, uint32_t to) {{ return ((((from - to) & 0xFFFFFFu) * 10u) + 128u) / 256u; }}
-static void begin(void) {{ SYSTICK[2] = 0u; }} /* which makes it begin anew, and forget that it ended */
-static uint32_t lost(void) {{ return (SYSTICK[0] >> 16) & 1u; }}
+__attribute__((section(".vectors"), used)) static const void *const vectors[16] = {
+    &stack[8192], (const void *)reset, (const void *)fault, (const void *)fault};
+static uint32_t now(void) { return SYSTICK[2]; }
+static uint32_t passed(uint32_t from, uint32_t to) { return ((((from - to) & 0xFFFFFFu) * 10u) + 128u) / 256u; }
+static void begin(void) { SYSTICK[2] = 0u; } /* which makes it begin anew, and forget that it ended */
+static uint32_t lost(void) { return (SYSTICK[0] >> 16) & 1u; }
 #define STACK_POINTER "sp"
 static void ask(uintptr_t what, uintptr_t with)
-{{
+{
     register uintptr_t r0 __asm("r0") = what;
     register uintptr_t r1 __asm("r1") = with;
     __asm volatile("bkpt 0xab" : "+r"(r0) : "r"(r1) : "memory");
-}}
-static void fault(void) {{ ask(0x18u, 0x20023u); }} /* which ends the emulator with a status that is not 0 */
+}
+static void fault(void) { ask(0x18u, 0x20023u); } /* which ends the emulator with a status that is not 0 */
 #endif
 __attribute__((noinline)) void *memcpy(void *to, const void *from, size_t n)
-{{
-    for (size_t i = 0; i < n; i++) {{ ((volatile uint8_t *)to)[i] = ((const uint8_t *)from)[i]; }}
+{
+    for (size_t i = 0; i < n; i++) { ((volatile uint8_t *)to)[i] = ((const uint8_t *)from)[i]; }
     return to;
-}}
+}
 __attribute__((noinline)) void *memset(void *to, int byte, size_t n)
-{{
-    for (size_t i = 0; i < n; i++) {{ ((volatile uint8_t *)to)[i] = (uint8_t)byte; }}
+{
+    for (size_t i = 0; i < n; i++) { ((volatile uint8_t *)to)[i] = (uint8_t)byte; }
     return to;
-}}
+}
 __attribute__((noinline)) int memcmp(const void *one, const void *other, size_t n)
-{{
+{
     size_t i = 0;
-    while ((i < n) && (((volatile const uint8_t *)one)[i] == ((volatile const uint8_t *)other)[i])) {{ i++; }}
+    while ((i < n) && (((volatile const uint8_t *)one)[i] == ((volatile const uint8_t *)other)[i])) { i++; }
     return (int)(i < n);
-}}
-static void say(const char *text) {{ ask(4u, (uintptr_t)text); }}
+}
+static void say(const char *text) { ask(4u, (uintptr_t)text); }
 static void say_number(uint32_t n)
-{{
+{
     char text[12];
     char *at = &text[11];
     *at = 0;
-    do {{ at--; *at = (char)('0' + (n % 10u)); n /= 10u; }} while (n != 0u);
+    do { at--; *at = (char)('0' + (n % 10u)); n /= 10u; } while (n != 0u);
     say(at);
-}}
-__attribute__((noinline)) static void nothing(void *state) {{ __asm volatile("" : : "r"(state)); }}
-typedef struct {{ uint32_t calls, most, deepest; }} seen_t;
+}
+__attribute__((noinline)) static void nothing(void *state) { __asm volatile("" : : "r"(state)); }
+typedef struct { uint32_t calls, most, deepest; } seen_t;
 __attribute__((noinline)) static void measure(call_t call, void *state, seen_t *seen)
-{{
+{
     register uint32_t *sp __asm(STACK_POINTER);
     volatile uint32_t *low = sp - PAINTED;
-    for (uint32_t i = 0u; i < PAINTED; i++) {{ low[i] = 0x5AA5C33Cu; }}
+    for (uint32_t i = 0u; i < PAINTED; i++) { low[i] = 0x5AA5C33Cu; }
     begin();
     const uint32_t from = now();
     call(state);
@@ -190,41 +188,37 @@ __attribute__((noinline)) static void measure(call_t call, void *state, seen_t *
     const bool overrun = lost() != 0u; /* more than the counter holds */
     const uint32_t count = passed(from, to);
     uint32_t deep = 0u;
-    while ((deep < PAINTED) && (low[deep] == 0x5AA5C33Cu)) {{ deep++; }}
+    while ((deep < PAINTED) && (low[deep] == 0x5AA5C33Cu)) { deep++; }
     deep = (PAINTED - deep) * 4u;
     seen->calls++;
-    if (overrun) {{ seen->most = 0xFFFFFFFFu; }}
-    if (count > seen->most) {{ seen->most = count; }}
-    if (deep > seen->deepest) {{ seen->deepest = deep; }}
-}}
+    if (overrun) { seen->most = 0xFFFFFFFFu; }
+    if (count > seen->most) { seen->most = count; }
+    if (deep > seen->deepest) { seen->deepest = deep; }
+}
 static void tell(const char *name, const seen_t *seen, const seen_t *none)
-{{
+{
     const bool whole = (seen->most != 0xFFFFFFFFu);
     say("rcsc "); say(name); say(" "); say_number(seen->calls); say(" ");
     say_number(whole ? ((seen->most - none->most) + 1u) : 0xFFFFFFFFu); say(" "); say_number(seen->deepest); say("\\n");
-}}
+}
 #if defined(__riscv)
 __attribute__((used)) void start(void)
-{{
+{
     (void)main();
     ask(0x18u, 0x20026u);
-}}
+}
 #else
 void reset(void)
-{{
+{
     *(volatile uint32_t *)0xE000ED88u |= 0xF00000u; /* the unit for reals, where there is one */
     SYSTICK[1] = 0xFFFFFFu;
     SYSTICK[0] = 5u;
     (void)main();
     ask(0x18u, 0x20026u);
-}}
+}
 #endif
 """
-
-
-def harness() -> str:
-    """Return the C that an image begins with: `measure(call, state, seen)` calls and counts, `tell(name, seen, none)` prints."""
-    return HARNESS.format(painted=PAINTED)
+"""The C that an image begins with: `measure(call, state, seen)` calls and counts, `tell(name, seen, none)` prints."""
 
 
 def run_image(board: Board, place: Path, files: Mapping[str, str], image: str) -> str | BuildFailed:

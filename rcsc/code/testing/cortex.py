@@ -11,7 +11,7 @@ from math import prod
 
 from rcsc.base.host.children import scratch
 from rcsc.base.host.tools import Absent, BuildFailed
-from rcsc.code.testing.boards import BOARDS, harness, run_image
+from rcsc.code.testing.boards import BOARDS, HARNESS, run_image
 from rcsc.code.testing.executors.edges import leaf_edges
 from rcsc.code.testing.executors.externs import SCRIPTS, externs
 from rcsc.code.testing.executors.reference import constant
@@ -115,7 +115,7 @@ def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
     """The C text that runs one table on the target."""
     table, struct = program.tables[number], symbols.struct
     begun, given, ended = loops(program, symbols, table, most)
-    parts = [harness(), f'#include "{symbols.header}"', reference_c(program, symbols)]
+    parts = [HARNESS, f'#include "{symbols.header}"', reference_c(program, symbols)]
     parts += ["extern uint32_t rcsc_script;", *leaf_values(program, symbols), *_same(program, symbols)]
     parts += [f"int main(void) {{ static {struct} a, b; {symbols.init}(&a);"]
     parts += ["uint32_t inputs = 0, lines = 0, steps = 0, differ = 0;", *begun]

@@ -111,6 +111,11 @@ class Report:
     findings: tuple[Finding, ...]
     failure: str = ""
 
+    @property
+    def meant(self) -> int:
+        """The number of findings that a reason explains."""
+        return sum(bool(finding.reason) for finding in self.findings)
+
 
 TOOLS = ("gcc", "clang-19", "clang-tidy-19")
 
@@ -379,9 +384,8 @@ def _constant(value: int) -> str:
 
 def _figures(reports: list[Report]) -> Iterator[str]:
     for report in reports:
-        meant = sum(bool(finding.reason) for finding in report.findings)
-        open_ = len(report.findings) - meant
-        rest = f"{open_} findings, and {meant} that are meant" if meant else f"{open_} findings"
+        open_ = len(report.findings) - report.meant
+        rest = f"{open_} findings" + (f", and {report.meant} that are meant" if report.meant else "")
         yield f"{report.tool}: {report.failure or rest}"
 
 
@@ -392,8 +396,8 @@ def _kept(reports: list[Report]) -> dict[str, str]:
     findings = csv_text([("tool", "file", "line", "check", "finding", "reason"), *rows])
     lines = ["# Analysers and sanitizers", "", "| Run | findings | meant |", "| --- | ---: | ---: |"]
     for report in reports:
-        meant = sum(bool(finding.reason) for finding in report.findings)
-        lines.append(f"| {report.tool} | {report.failure or len(report.findings) - meant} | {meant} |")
+        open_ = len(report.findings) - report.meant
+        lines.append(f"| {report.tool} | {report.failure or open_} | {report.meant} |")
     lines += ["", "What is meant, by check; every place is in `findings.csv`:", ""]
     count = Counter(f.check for report in reports for f in report.findings if f.reason)
     lines += [

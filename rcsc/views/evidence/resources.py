@@ -17,7 +17,7 @@ from rcsc.base.host.children import scratch
 from rcsc.base.host.files import csv_text, read
 from rcsc.base.host.tools import BuildFailed, ending, run_command
 from rcsc.code.emit.plan import Plan
-from rcsc.code.testing.boards import BOARDS, OPTIMIZED, Board, compiled, harness, link, run_image
+from rcsc.code.testing.boards import BOARDS, HARNESS, OPTIMIZED, Board, compiled, link, run_image
 from rcsc.code.testing.cortex import leaf_values, loops
 from rcsc.code.testing.executors.externs import STAND_INS, c_stand_ins, externs
 from rcsc.code.testing.executors.symbols import Symbols, symbols_of
@@ -149,7 +149,7 @@ def image_c(plan: Plan, symbols: Symbols, entries: Mapping[str, str]) -> str:
     program, struct = plan.program, symbols.struct
     script = ("extern uint32_t rcsc_script;",) if externs(program) else ()
     drawn = ("rcsc_script = any(64u);",) if externs(program) else ()
-    parts = [harness(), f'#include "{symbols.header}"', *script, *leaf_values(program, symbols)]
+    parts = [HARNESS, f'#include "{symbols.header}"', *script, *leaf_values(program, symbols)]
     parts += [f"static seen_t none, seen[{len(entries)}];", f"static {struct} a, b, c;"]
     parts += _inputs(program, symbols)
     parts += [f"static void all(void) {{ {' '.join(drawn)}"]

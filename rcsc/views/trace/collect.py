@@ -151,7 +151,7 @@ def _matrix(
         _table_proofs(proof.tables),
         tuple((found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics),
         whole_vectors(program, settings) if wanted.vectors else None,
-        {} if cache is None else _property_proofs(program.program, cache),
+        {} if cache is None else property_proofs(program.program, cache),
         project.loaded.sources,
     )
     return matrix(plan, known)
@@ -170,7 +170,7 @@ def _table_proofs(reports: Iterable[TableReport]) -> dict[str, TableProof]:
     }
 
 
-def _property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
+def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
     """Return the verdicts of earlier proofs of the levels together on each property; those that nobody proved are left out."""
     return dict(_known(program, cache)) if program.properties else {}
 

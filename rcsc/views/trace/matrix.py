@@ -344,7 +344,7 @@ class _Build:
             yield self._named("invariant", invariant, states, (), KEPT)
         for stated in self.program.properties:
             proof = self.known.properties.get(stated.name, NOT_HERE)
-            changing = (line.words for line in self._speaking(stated))
+            changing = (line for line, body in self._bodies() if self._changes(body, stated))
             yield self._named("property", stated, stated.text, changing, proof)
 
     def _named(
@@ -359,23 +359,21 @@ class _Build:
             sort, str(one.name), self.place(one.span), one.requirements, states, tuple(used), proof
         )
 
-    def _users(self, procedure: str) -> Iterator[str]:
+    def _bodies(self) -> Iterator[tuple[str, list[Statement]]]:
+        """Yield each line in words, with what it does."""
         for table in self.plan.tables:
             for line in table.lines:
-                if procedure in self.called([action.statement for action in line.actions]):
-                    yield f"{table.table.name} line {line.name}"
+                yield f"{table.table.name} line {line.name}", [action.statement for action in line.actions]
+
+    def _users(self, procedure: str) -> Iterator[str]:
+        yield from (line for line, body in self._bodies() if procedure in self.called(body))
         for level in self.program.levels:
             if procedure in self.called(_calls(level)):
                 yield f"level {level.name}"
 
-    def _speaking(self, stated: Property) -> Iterator[Origin]:
-        """Return the lines that change a variable of the property."""
-        for table in self.plan.tables:
-            for line in table.lines:
-                if self.spoken[stated.name] & set(
-                    self.written([action.statement for action in line.actions])
-                ):
-                    yield Origin(Sort.LINE, str(table.table.name), str(line.name))
+    def _changes(self, body: list[Statement], stated: Property) -> bool:
+        """Return whether statements may change a variable of the property."""
+        return bool(self.spoken[stated.name] & set(self.written(body)))
 
     def called(self, body: Iterable[Statement]) -> dict[str, None]:
         """Return the procedures that statements run, calls of calls included."""

@@ -24,7 +24,7 @@ from rcsc.lang.model import Bool, Enum, Kind, Program, Real, Snapshot, Value
 
 FORMAT = 2
 """Of the documents; a reader refuses a greater one."""
-TABLE_COLUMNS = ("table", "line", "column", "condition", "purpose", "expected")
+TABLE_COLUMNS = ("line", "column", "condition", "purpose", "expected")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,7 +167,7 @@ def _table(document: VectorSet, part: Vectors) -> dict[str, object]:
         "shown": part.shown,
         "vectors": [
             {"number": numbers.get(at)}
-            | {name: getattr(vector, name) for name in TABLE_COLUMNS[1:]}
+            | {name: getattr(vector, name) for name in TABLE_COLUMNS}
             | {"inputs": _values(document.program, vector.snapshot)}
             for at, vector in enumerate(part.vectors, 1)
         ],

@@ -34,7 +34,6 @@ class Vector:
         snapshot: A value for every leaf.
     """
 
-    table: str
     line: str
     column: str
     condition: str
@@ -51,7 +50,6 @@ class Unshown:
         reason: `ranges` or `assumptions` (shown impossible within them), or `not found`.
     """
 
-    table: str
     line: str
     column: str
     condition: str
@@ -216,14 +214,14 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
                 text = _spelled(atom)
                 answer = finder.pair(line, test, number)
                 if isinstance(answer, str):
-                    unshown.append(Unshown(table.name, line.name, column, text, answer))
+                    unshown.append(Unshown(line.name, column, text, answer))
                     continue
                 shown += 1
                 on, off, pair = answer
                 for snapshot, truth in ((on, pair.truth_on), (off, not pair.truth_on)):
                     named = finder.name_at(snapshot)
                     purpose = str(truth).lower()
-                    vectors.append(Vector(table.name, line.name, column, text, purpose, named, snapshot))
+                    vectors.append(Vector(line.name, column, text, purpose, named, snapshot))
     if table.default is not None and lines is None:
         _reached(finder, str(table.default.name), finder.default(), vectors, unshown)
     return Vectors(table.name, conditions, shown, tuple(vectors), tuple(unshown))
@@ -240,9 +238,8 @@ def _reached(
     finder: Finder, name: str, found: Snapshot | Missing, vectors: list[Vector], unshown: list[Unshown]
 ) -> None:
     """Add the vector that takes a line, or why there is none."""
-    table = finder.table.name
     if isinstance(found, Missing):
         reason = "not found" if found is Missing.UNKNOWN else "ranges"
-        unshown.append(Unshown(table, name, "", "", reason))
+        unshown.append(Unshown(name, "", "", reason))
     else:
-        vectors.append(Vector(table, name, "", "", "reach", finder.name_at(found), found))
+        vectors.append(Vector(name, "", "", "reach", finder.name_at(found), found))
