@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import nan
-from typing import ClassVar, Literal
+from typing import Literal
 
 import pytest
 
-from rcsc.base.host.files.plain import Kept, plain, read
+from rcsc.base.host.files.plain import plain, read
 from rcsc.run.signature import Values
 from rcsc_cell.cell.fixture import (
     IN_MM,
@@ -257,26 +257,6 @@ def test_a_fault_is_no_state_and_stays_until_it_is_mended() -> None:
 
 
 @dataclass
-class Within(Kept):
-    transient: ClassVar[frozenset[str]] = frozenset({"made_with"})
-
-    made_with: object
-    many: int = 0
-
-
-@dataclass
-class Around(Kept):
-    within: Within
-
-
-def test_what_is_kept_inside_another_is_put_back_in_place() -> None:
-    made_with = object()
-    around = Around(Within(made_with))
-    around.restore(json.loads(json.dumps(Around(Within(object(), 3)).state())))
-    assert (around.within.made_with, around.within.many) == (made_with, 3)
-
-
-@dataclass
 class Inner:
     name: str
     at: tuple[float, float]
@@ -284,10 +264,7 @@ class Inner:
 
 
 @dataclass
-class Outer(Kept):
-    transient: ClassVar[frozenset[str]] = frozenset({"made_with"})
-
-    made_with: object
+class Outer:
     inner: Inner
     many: list[Inner] = field(default_factory=list)
     by_name: dict[str, Inner] = field(default_factory=dict)
@@ -296,12 +273,9 @@ class Outer(Kept):
 
 def test_plain_values_say_what_they_were() -> None:
     inner = Inner("a", (0.1, -0.0), (True, 1, 1.0, 0))
-    outer = Outer(object(), inner, [inner, Inner("b", (1e-300, 3.0))], {"x": inner}, None)
-    other = Outer(object(), Inner("", (0.0, 0.0)))
-    other.restore(json.loads(json.dumps(outer.state())))
-    assert repr(other.inner) == repr(inner)  # 1, 1.0 and True are equal and not the same
-    assert (other.many, other.by_name, other.last) == (outer.many, outer.by_name, None)
-    assert other.made_with is not outer.made_with
+    outer = Outer(inner, [inner, Inner("b", (1e-300, 3.0))], {"x": inner}, None)
+    other = read(Outer, json.loads(json.dumps(plain(outer))))
+    assert repr(other) == repr(outer)  # 1, 1.0 and True are equal and not the same
 
 
 @pytest.mark.parametrize(
@@ -321,7 +295,7 @@ def test_what_could_not_be_read_again_is_not_kept() -> None:
 
 
 def test_the_state_of_something_else_is_refused() -> None:
-    with pytest.raises(ValueError, match="not the state of a ViseController"):
-        ViseController().restore(MachineController().state())
+    with pytest.raises(ValueError, match="not the values of a ViseController"):
+        read(ViseController, plain(MachineController()))
     with pytest.raises(ValueError, match="not the state of a plant"):
-        vise(part=True).restore(MachineController().state())
+        vise(part=True).restore(plain(MachineController()))

@@ -8,7 +8,6 @@ position is in mm from where it touches a part: open is positive. The jaws are o
 from dataclasses import dataclass, field
 from math import isfinite
 
-from rcsc.base.host.files.plain import Kept
 from rcsc.run.signature import Values
 from rcsc_cell.workstation.orders import CLOSED_MM, DONE, EXECUTING, FAILED, OPEN_MM
 
@@ -83,7 +82,7 @@ class JawController:
 
 
 @dataclass(slots=True)
-class ViseController(Kept):
+class ViseController:
     """Take the workstation's orders, and report from the measured jaws alone whether they are carried out.
 
     An order is taken when its number is another than the last one's, and the first whatever its number. Before it the jaws do not move.
@@ -141,7 +140,7 @@ class ViseController(Kept):
 
 
 @dataclass(slots=True)
-class MachineController(Kept):
+class MachineController:
     """Carries out operations, each for `OPERATION_TICKS`; does none on a part that is not clamped.
 
     Attributes:

@@ -1,8 +1,7 @@
 """Values kept as plain ones, which JSON keeps exactly, and read back by their declared types.
 
 In: dataclasses whose fields are plain values, words of a `StrEnum`, literals, tuples, lists, dictionaries by text, and dataclasses of
-these. Out: the same after `plain` and `read`; what no such value was written as is refused. `Kept` has `state` and `restore` of
-`rcsc.run.orders.stopped.Restorable`.
+these. Out: the same after `plain` and `read`; what no such value was written as is refused.
 """
 
 import types
@@ -11,7 +10,7 @@ from dataclasses import fields, is_dataclass
 from enum import StrEnum
 from functools import cache
 from math import isfinite
-from typing import Any, ClassVar, Literal, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 from rcsc.base.host.files.names import shown
 
@@ -20,41 +19,9 @@ MOST_WHOLE, MOST_REAL = 2**128, 1e12
 """What a number that is read back may be at most; a generator of noise has whole numbers of 128 bits."""
 
 
-class Kept:
-    """A dataclass that can be put back.
-
-    Attributes:
-        transient: Fields that are no state: what it was made with, and faults.
-    """
-
-    __slots__ = ()
-    transient: ClassVar[frozenset[str]] = frozenset()
-
-    def state(self) -> dict[str, Any]:
-        """Its state in plain values."""
-        return {name: plain(getattr(self, name)) for name in _names(self)}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Puts back a state.
-
-        Raises:
-            ValueError: It is none of this class.
-        """
-        hints = get_type_hints(type(self))
-        if set(state) != set(_names(self)):
-            raise ValueError(f"not the state of a {type(self).__name__}")
-        for name, value in state.items():
-            now = getattr(self, name)
-            if isinstance(now, Kept):  # in place: what is transient stays
-                now.restore(value)
-            else:
-                setattr(self, name, read(hints[name], value))
-
-
 def _names(kept: Any) -> list[str]:
-    """Return the fields of a dataclass, or of one of its objects, that are state."""
-    left: frozenset[str] = getattr(kept, "transient", frozenset())
-    return [field.name for field in fields(kept) if field.name not in left]
+    """Return the fields of a dataclass, or of one of its objects."""
+    return [field.name for field in fields(kept)]
 
 
 def plain(value: Any) -> Any:
