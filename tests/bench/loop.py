@@ -18,8 +18,8 @@ from rcsc.run.orders.operator import ScriptedRun
 from rcsc.run.system import Kind, System
 from rcsc_cell.cell.ready import Backend, plant
 from rcsc_cell.database.ask import Database
-from rcsc_cell.episodes.witness import Timed, Witness
-from rcsc_cell.workstation.prepared import prepare
+from rcsc_cell.episodes.witness import Timed, Witness, timed
+from tests.support.cells import prepare
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"
 ROUNDS = 3
@@ -66,17 +66,17 @@ def spent(backend: Backend, kind: Kind, log: Path) -> Spent:
     Raises:
         AssertionError: A row was not done: what was measured is not MAKE BOXT.
     """
-    timed: list[Timed] = []
+    worlds: list[Timed] = []
 
     def outside(database: Database) -> list[Timed]:
-        timed.append(Timed(plant(database, backend)))
-        return timed
+        worlds.append(timed(plant(database, backend)))
+        return worlds
 
     run = prepare(SYSTEM, "make_boxt", kind, outside)
     with Recorder(run.system, log) as recorder:
         watches = [
             Stopwatch(recorder),
-            Stopwatch(Witness(ScriptedRun(run.system, run.station), timed=timed[0], database=run.database)),
+            Stopwatch(Witness(ScriptedRun(run.system, run.station), plant=worlds[0], database=run.database)),
         ]
         run.system.watch.extend(watches)
         begun = time.perf_counter()
@@ -84,7 +84,7 @@ def spent(backend: Backend, kind: Kind, log: Path) -> Spent:
         whole = time.perf_counter() - begun
     ticks = run.system.tick
     control_s = ticks * run.system.description.tick_ms / 1000
-    return Spent(ticks, control_s, whole, timed[0].seconds, *(watch.seconds for watch in watches))
+    return Spent(ticks, control_s, whole, worlds[0].seconds, *(watch.seconds for watch in watches))
 
 
 def best(backend: Backend, kind: Kind, log: Path) -> Spent:

@@ -19,8 +19,7 @@ from rcsc_cell.cell.reach import home
 from rcsc_cell.cell.ready import Backend, lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.vision.flood import Features
-from rcsc_cell.workstation.prepared import prepare
-from tests.support.cells import SYSTEM, database
+from tests.support.cells import SYSTEM, database, prepare
 
 CELL = Path(__file__).parents[2] / "sim" / "rcsc_cell"
 FIRST_ROW = "command,part,source,dest,end_at\nMOVE,BOXT (2),BUFFER,FIX-MAC1,\n"

@@ -19,7 +19,7 @@ from rcsc.desk.shell.opening import Opening, opened
 from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.run.faults import switch
 from rcsc.run.signature import Values
-from rcsc_cell.cell.arm import LIMITS, margins_deg, plate, skeleton, solutions, solve
+from rcsc_cell.cell.arm import LIMITS, _arms, _wrist, margins_deg, plate, skeleton, solve
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.mujoco_model import mjcf
 from rcsc_cell.cell.physical import Physical
@@ -30,11 +30,10 @@ from rcsc_cell.cell.robot import FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import build
 from rcsc_cell.database.pose import Pose, Rotation, about_y, about_z, nine, pose_of, product
-from rcsc_cell.episodes.witness import Timed
+from rcsc_cell.episodes.witness import timed
 from rcsc_cell.vision.flood import Features
 from rcsc_cell.workstation.orders import DONE, EXECUTING, FAILED
-from rcsc_cell.workstation.prepared import prepare
-from tests.support.cells import REPO, SYSTEM, database
+from tests.support.cells import REPO, SYSTEM, database, prepare
 
 joint = st.tuples(
     *(st.one_of(st.sampled_from([low, high, 0.0]), st.floats(low, high)) for low, high in LIMITS)
@@ -77,7 +76,7 @@ def test_three_points_that_are_no_plate(numbers: tuple[float, ...]) -> None:
 @given(joint)
 def test_every_solution_brings_the_plate_there(joints: tuple[float, ...]) -> None:
     wanted = plate(joints)
-    for solution in solutions(wanted):
+    for solution in (joints for arm in _arms(wanted) for joints in _wrist(wanted.turn, *arm)):
         assert near(plate(solution), wanted, 1e-5)
     found = solve(wanted, joints)
     if found is not None:  # within a hair of a limit the way that is nearest may lie beyond it
@@ -93,8 +92,8 @@ def test_every_solution_brings_the_plate_there(joints: tuple[float, ...]) -> Non
 
 
 def test_what_is_too_far_has_no_solution() -> None:
-    assert solutions(Pose(about_z(0.0), (2000.0, 0.0, 700.0))) == []
-    assert solutions(Pose(about_z(0.0), (0.0, 0.0, 700.0))) == []
+    assert _arms(Pose(about_z(0.0), (2000.0, 0.0, 700.0))) == []
+    assert _arms(Pose(about_z(0.0), (0.0, 0.0, 700.0))) == []
 
 
 def test_the_model_is_the_arm(held: Database) -> None:
@@ -424,6 +423,5 @@ def test_every_switch_is_one_by_name_for_the_shell_for_run_and_for_the_studio() 
             commands.do(f"fault {wrong}")
     with pytest.raises(Refused, match="no plant has a fault"):
         commands.do("fault blint")
-    timed = Timed(cell)
-    switch((timed,), "vise_stuck", on=True)
+    switch((timed(cell),), "vise_stuck", on=True)
     assert cell.faults.vise_stuck

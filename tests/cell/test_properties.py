@@ -17,8 +17,8 @@ from rcsc_cell.episodes.episode import (
     Push,
     SwitchTo,
 )
+from rcsc_cell.episodes.kind import fault_classes
 from rcsc_cell.episodes.loop import Loop, run
-from rcsc_cell.episodes.part_faults import fault_classes
 from rcsc_cell.episodes.sampling import MAKE_BOXT
 from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import PropertyClass

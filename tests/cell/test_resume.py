@@ -28,7 +28,7 @@ from rcsc.run.system import Outside, StateTableError, signatures
 from rcsc_cell.cell.plant import Plant
 from rcsc_cell.cell.ready import lying, plant
 from rcsc_cell.database.ask import Database
-from rcsc_cell.episodes.witness import Timed
+from rcsc_cell.episodes.witness import Timed, timed
 from rcsc_cell.workstation.interlocks import CellState
 from rcsc_cell.workstation.orders import (
     DONE,
@@ -39,10 +39,9 @@ from rcsc_cell.workstation.orders import (
     VISE_ORDER,
     VISE_REPORT,
 )
-from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
-from tests.support.cells import REPO, SYSTEM
+from tests.support.cells import REPO, SYSTEM, ScriptDraft, prepare
 
 HEAD = "command,part,source,dest,end_at\n"
 ROWS = 'MOVE,,,FIX-SAFE,\n"VISE-CLOSE RIGHT, CLOSE LEFT",,,,\nMOVE,,,WS-SAFE,\n"VISE-OPEN RIGHT",,,,\n'
@@ -73,13 +72,13 @@ def project(built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
 
 def outside(database: Database) -> list[Timed]:
     """As `rcsc run` has it."""
-    return [Timed(plant(database, "kinematic"))]
+    return [timed(plant(database, "kinematic"))]
 
 
 def plant_of(made: ScriptDraft) -> Plant:
     """The plant of a run."""
-    [timed] = [one for one in made.system.outside if isinstance(one, Timed)]
-    return timed.inner
+    [world] = [one for one in made.system.outside if isinstance(one, Timed)]
+    return world
 
 
 def begun(rows: tuple[ScriptRow, ...] | str = "go.csv") -> ScriptDraft:
@@ -622,7 +621,7 @@ def test_a_stopped_run_that_was_changed_anywhere_is_taken_or_refused(seed: int) 
 
 def other_parts(database: Database) -> list[Timed]:
     """One part fewer."""
-    return [Timed(plant(database, "kinematic", lying(database)[1:]))]
+    return [timed(plant(database, "kinematic", lying(database)[1:]))]
 
 
 @pytest.mark.usefixtures("project")
@@ -631,7 +630,7 @@ def other_parts(database: Database) -> list[Timed]:
     [
         (lambda _: (), "nothing outside is a `Timed`"),
         (other_parts, "the state is of a cell with other parts"),
-        (lambda database: [Timed(plant(database))], "the stopped run is of another plant"),
+        (lambda database: [timed(plant(database))], "the stopped run is of another plant"),
     ],
     ids=["nothing", "parts", "physics"],
 )

@@ -21,9 +21,8 @@ from rcsc_cell.database.build import BadData, build
 from rcsc_cell.database.readable import NUMBERED
 from rcsc_cell.episodes.witness import placements
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
-from rcsc_cell.workstation.prepared import prepare
 from rcsc_cell.workstation.script import ScriptRow, read_script
-from tests.support.cells import REPO, SYSTEM
+from tests.support.cells import REPO, SYSTEM, prepare
 from tests.support.programs.texts import one_row_a_line
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object", "open_grip")

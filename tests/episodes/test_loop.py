@@ -35,8 +35,8 @@ from rcsc_cell.episodes.episode import (
     SwitchTo,
     script,
 )
+from rcsc_cell.episodes.kind import fault_classes
 from rcsc_cell.episodes.loop import Loop, run
-from rcsc_cell.episodes.part_faults import fault_classes
 from rcsc_cell.episodes.sampling import draw
 from tests.support.loops import ACQUIRE, keep
 

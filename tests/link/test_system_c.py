@@ -14,10 +14,9 @@ from rcsc.run.link.drawn_script import Tick, drawing, script
 from rcsc.run.log.schema import outside_wires
 from rcsc.run.system import System, signatures
 from rcsc_cell.cell.ready import plant
-from rcsc_cell.workstation.prepared import prepare
 from tests.link.drawn_systems import drawn_system
 from tests.link.played import CSystem, Seen, by_python, first_difference, seen_of
-from tests.support.cells import SYSTEM, database
+from tests.support.cells import SYSTEM, database, prepare
 
 
 @pytest.mark.parametrize("data", ["dock", "protocol"])

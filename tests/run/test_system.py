@@ -15,8 +15,16 @@ from rcsc_cell.cell.ready import Lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.witness import placements
-from rcsc_cell.workstation.prepared import ScriptDraft, prepare
-from tests.support.cells import COMMAND_ENDS, PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
+from tests.support.cells import (
+    COMMAND_ENDS,
+    PAUSE_ENDS,
+    SCRIPT,
+    SYSTEM,
+    Cell,
+    ScriptDraft,
+    prepare,
+    through_script,
+)
 
 
 def world(database: Database) -> tuple[Plant]:

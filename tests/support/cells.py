@@ -1,18 +1,23 @@
 """Cells for tests: runs that can be forked at any tick, and a workstation that says what it is told."""
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import description
 from rcsc.run.levels import RunningLevel
+from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.script import script_path
 from rcsc.run.signature import Value, Values
-from rcsc.run.system import Kind, System, assemble, signatures
+from rcsc.run.system import Kind, Outside, System, assemble, signatures
 from rcsc_cell.cell.ready import Lying, plant
 from rcsc_cell.database.ask import Database
-from rcsc_cell.workstation.prepared import database_of
+from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places
+from rcsc_cell.workstation.script import ScriptRow, read_script
+from rcsc_cell.workstation.station import RowResult, Workstation, workstation
 
 REPO = Path(__file__).parents[2]
 SYSTEM = REPO / "tables" / "system.toml"
@@ -26,6 +31,36 @@ def database() -> Database:
     """The cell's database, made anew where the data has changed."""
     said = description(SYSTEM)
     return database_of(said, signatures(said))
+
+
+@dataclass(slots=True)
+class ScriptDraft:
+    """A system in the cell, before the first tick of its script."""
+
+    system: System
+    station: Workstation
+    database: Database
+
+    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult]:
+        """Run to the end of the script, or until TASK has paused after a failure."""
+        for result in ScriptedRun(self.system, self.station).steps(most):
+            yield cast(RowResult, result)
+
+
+def prepare(
+    path: Path,
+    rows: tuple[ScriptRow, ...] | str,
+    kind: Kind,
+    outside: Callable[[Database], Iterable[Outside]],
+) -> ScriptDraft:
+    """A system with a script, or its name; `outside` makes robot, hand, camera, vise and machine."""
+    system = description(path)
+    signs = signatures(system)
+    needs_cell(system, signs)
+    held = database_of(system, signs)
+    script = read_script(script_path(rows, path.parent)) if isinstance(rows, str) else rows
+    station = workstation(script, held.locations, signs["task"], safe_places(held))
+    return ScriptDraft(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)
 
 
 @dataclass(slots=True)

@@ -82,11 +82,6 @@ def _frames(joints: Sequence[float]) -> list[Pose]:
     return frames
 
 
-def solutions(wanted: Pose) -> list[Joints]:
-    """Return every way to bring the plate to a pose, at most eight, ignoring limits."""
-    return [joints for arm in _arms(wanted) for joints in _wrist(wanted.turn, *arm)]
-
-
 def _arms(wanted: Pose) -> list[tuple[float, float, float]]:
     """Return the first three joints of every way to bring the plate to a pose."""
     x, y, z = wanted.point((0.0, 0.0, -FLANGE_MM))

@@ -15,9 +15,9 @@ interlocks, and its properties.
 
 Nothing here is trusted for a proof. What it costs: without physics a twentieth of what it costs with physics.
 
-Modules, in the order the data flows: an `episode` is a value; `sampling` draws one by seed, `part_faults` names what
-is odd in it. `setting` makes what a run needs, `operator` interrupts its script, `loop` puts them around the levels and
-watches the cell's properties; `kind` has all that as campaigns take it.
+Modules, in the order the data flows: an `episode` is a value; `sampling` draws one by seed. `operator` interrupts its
+script, `loop` puts what it needs around the levels and watches the cell's properties; `kind` names what is odd in it,
+and has all that as campaigns take it.
 `witness` watches a run for page and report, `stage` is the cell as
 the plant of its system.
 """

@@ -17,9 +17,9 @@ from rcsc.run.episodes.episode import Episode as EpisodeOfAnySystem
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
+from rcsc_cell.workstation.script import COLUMNS
 
 SYSTEM = Path(__file__).parents[3] / "tables" / "system.toml"
-COLUMNS = "command,part,source,dest,end_at"
 
 FAULTS: Mapping[str, str] = {
     **{switch.name: "a switch of rcsc_cell.cell.faults" for switch in fields(Faults)},
@@ -159,4 +159,4 @@ class Episode(SavedEpisode):
 
 def script(rows: Sequence[str]) -> str:
     """Return the rows as the text of a script, for `rcsc run`."""
-    return "\n".join((COLUMNS, *rows)) + "\n"
+    return "\n".join((",".join(COLUMNS), *rows)) + "\n"

@@ -3,10 +3,12 @@
 In: what `rcsc.run.campaign` asks of a kind of episodes. Out: `CELL`. The plant's name is the episode's backend.
 """
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import get_args
 
 from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.read import rows_of
 from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, sources
 from rcsc.run.description import BadDescription, description
 from rcsc.run.episodes.outcome import EpisodeOutcome
@@ -14,14 +16,14 @@ from rcsc.run.episodes.proved.claims import Claims
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.database.build import BadData
-from rcsc_cell.episodes.episode import FAULTS, Episode
-from rcsc_cell.episodes.part_faults import fault_classes
+from rcsc_cell.episodes.episode import FAULTS, Episode, PartSpec, script
 from rcsc_cell.episodes.sampling import draw
+from rcsc_cell.workstation.script import COLUMNS, PARTS
 
 _CHUNKS = {"kinematic": 10, "mujoco": 4}
 
 
-def _drawn(seed: int, system: Path, plant: str, script: str) -> Episode:  # noqa: ARG001  # its scripts are drawn, too
+def _drawn(seed: int, system: Path, plant: str, _script: str) -> Episode:
     """Return the episode of a seed.
 
     Raises:
@@ -57,8 +59,49 @@ def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG0
     return episode
 
 
-def _classes(episode: Episode, system: Path) -> tuple[str, ...]:  # noqa: ARG001  # an episode of the cell says all
-    return fault_classes(episode)
+def fault_classes(episode: Episode, system: Path | None = None) -> tuple[str, ...]:  # noqa: ARG001  # an episode of the cell says all
+    """Return which of `FAULTS` an episode has, in their order; empty where it is nominal.
+
+    Only parts that the script asks for count.
+    """
+    has = {
+        *(fault.fault for fault in episode.faults),
+        *(harm.kind for harm in episode.transport),
+        *(("restarted",) if episode.restarts else ()),
+        *(("changed command",) if episode.interruptions else ()),
+        *(("pushed",) if episode.pushes else ()),
+        *_part_faults(episode),
+    }
+    return tuple(name for name in FAULTS if name in has)
+
+
+def _part_faults(episode: Episode) -> Iterator[str]:
+    """`missing part`, `wrong part` and `two parts` of those that are asked for at the buffer; `odd size`, `odd weight` of any."""
+    here = [part.object for part in episode.parts if part.station == "buffer"]
+    for wanted in _asked((*episode.rows, *(interruption.row for interruption in episode.interruptions))):
+        if wanted not in here:
+            yield "wrong part" if here else "missing part"
+        elif sum(_top(part) == _top(wanted) for part in here) > 1:
+            yield "two parts"  # vision takes the nearer one, and the lines may tell that it is the other
+    usual = PartSpec("")
+    for part in episode.parts:
+        if part.size_mm:
+            yield "odd size"
+        if (part.density_kg_m3, part.friction) != (usual.density_kg_m3, usual.friction):
+            yield "odd weight"
+
+
+def _top(part: str) -> str:
+    """Parts with the same top: a box top and a box bottom differ in thickness alone (section 5.2)."""
+    return "box" if part in {"tbox", "bbox"} else part
+
+
+def _asked(rows: Sequence[str]) -> Iterator[str]:
+    """Yield objects that rows take from the buffer."""
+    for row in rows_of(script(rows), COLUMNS):
+        name = PARTS.get(row["part"].partition(" ")[0])
+        if name and row["source"] == "BUFFER":
+            yield name
 
 
 def _faults(system: Path, plant: str) -> tuple[str, ...]:  # noqa: ARG001  # both plants have all
@@ -79,6 +122,6 @@ def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of phys
 
 
 CELL = EpisodeKind(
-    _drawn, _run, Episode.from_json, _admit, _classes, _faults, _files,
+    _drawn, _run, Episode.from_json, _admit, fault_classes, _faults, _files,
     not_in_order=(BadDescription, BadData, NotBuilt), chunk=_chunk, extra="cell", takes_script=False,
 )  # fmt: skip

@@ -3,36 +3,41 @@
 In: an episode. Out: an `EpisodeOutcome`. Everything that is random comes from the episode's seed.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
+from rcsc.base.host.files.read import Malformed
 from rcsc.run.episodes import loop
 from rcsc.run.episodes.cycle import Broken, Cycle
 from rcsc.run.episodes.episode import OrderSpec
 from rcsc.run.episodes.operator import CHANGED, Given, OrderLine
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
+from rcsc.run.episodes.stand import Stand, stand
 from rcsc.run.orders.roles import field_of
 from rcsc.run.orders.script import BadScript
 from rcsc.run.plant.staged import Staged
-from rcsc.run.signature import Values
-from rcsc_cell.cell.faults import Faults
+from rcsc.run.signature import Signature, Values
 from rcsc_cell.cell.kinematic import Kinematic
-from rcsc_cell.cell.mujoco_model import Make
-from rcsc_cell.cell.ready import plant
-from rcsc_cell.episodes.episode import SYSTEM, Episode, Push
-from rcsc_cell.episodes.setting import lying as lying_at
-from rcsc_cell.episodes.setting import operator_of, ready
+from rcsc_cell.cell.mujoco_model import Body, Make
+from rcsc_cell.cell.ready import Lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.build import BadData
+from rcsc_cell.database.pose import about_z
+from rcsc_cell.episodes.episode import SYSTEM, Episode, PartSpec, Push, script
+from rcsc_cell.episodes.operator import Operator, commanded
 from rcsc_cell.properties import PROPERTIES
 from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
+from rcsc_cell.workstation.prepared import database_of, needs_cell
+from rcsc_cell.workstation.script import ScriptRow, script_rows
+from rcsc_cell.workstation.station import workstation
 
 NUMBERS = ("inc_command", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector")
 """Fields of TASK's orders that are no words."""
 WITHIN_TICKS = 1500
 """Within which a command ends, whatever goes wrong with the cell: what a table waits for has a limit there. Twice the longest seen."""
-USUAL: Mapping[str, float] = {switch.name: getattr(Faults(), switch.name) for switch in fields(Faults)}
-"""How each switch stands when nothing is wrong: bools, integers and floats."""
 
 
 class Loop(loop.Loop):
@@ -60,16 +65,16 @@ class Loop(loop.Loop):
         properties: Sequence[PropertyClass] = PROPERTIES,
         claims: Claims = NOTHING,
     ) -> None:
-        its, self.database = ready(system)
+        its, self.database = _ready(system)
         its = replace(its, system=replace(its.system, within=WITHIN_TICKS))
         refused = ""
         try:
-            self.orders = operator_of(episode, self.database, its.signs["task"])
+            self.orders = _operator(episode, self.database, its.signs["task"])
         except (BadScript, ValueError):
             refused, episode = "refused", replace(episode, rows=(), interruptions=())
-            self.orders = operator_of(episode, self.database, its.signs["task"])
+            self.orders = _operator(episode, self.database, its.signs["task"])
         self.in_cell = episode
-        lying = [lying_at(self.database, part) for part in episode.parts]
+        lying = [_lying(self.database, part) for part in episode.parts]
         self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
         around = loop.Around(Staged((self.plant,), self.database.queries), self.orders)
         super().__init__(episode.in_any_system(), its, claims, around)
@@ -128,8 +133,8 @@ class Loop(loop.Loop):
             if fault.first_tick <= tick <= fault.last_tick
         }
         if wanted != self._set:
-            for name, usual in USUAL.items():
-                setattr(self.plant.faults, name, type(usual)(wanted.get(name, usual)))
+            for name in self.plant.faults:
+                self.plant.faults.set(name, wanted.get(name, 0.0))
         self._set = wanted
 
     def _note(self, tick: int) -> None:
@@ -222,3 +227,64 @@ def run(
         OSError: The log cannot be written.
     """
     return Loop(episode, system, claims=claims).finish(log)
+
+
+# --- what a loop is made of ---
+
+
+def _ready(system: Path) -> tuple[Stand, Database]:
+    """Return the system with its database, read once while their files do not change."""
+    its = stand(system)
+    data = its.system.database
+    return its, _database(system, its.files, data.stat().st_mtime_ns if data.is_file() else 0)
+
+
+@lru_cache(maxsize=64)
+def _database(system: Path, _files: tuple[tuple[str, int], ...], _time_ns: int) -> Database:
+    its = stand(system)
+    needs_cell(its.system, its.signs)
+    return database_of(its.system, its.signs)
+
+
+@lru_cache(maxsize=1024)
+def _rows(rows: tuple[str, ...]) -> tuple[ScriptRow, ...]:
+    """Return rows of a script; raises BadScript where one says nothing that a workstation can do."""
+    try:
+        return script_rows(script(rows), "the episode")
+    except Malformed as error:
+        raise BadScript(f"the episode: {error}") from error
+
+
+def _operator(episode: Episode, database: Database, task: Signature) -> Operator:
+    """Return the workstation with the episode's script, and whoever interrupts it.
+
+    Raises:
+        BadScript: A row says nothing, or names something unknown.
+        ValueError: An interruption is none of TASK's commands, or several.
+    """
+    changes = sorted(episode.interruptions, key=lambda change: change.tick)
+    rows = workstation(
+        [row for change in changes for row in _rows((change.row,))], database.locations, task
+    ).rows
+    station = workstation(_rows(episode.rows), database.locations, task)
+    for row in rows:
+        commanded(station, row)
+    return Operator(
+        station=station, changes=[(change.tick, row) for change, row in zip(changes, rows, strict=True)]
+    )
+
+
+def _lying(database: Database, part: PartSpec) -> Lying:
+    """Return a part where the episode has it.
+
+    Raises:
+        BadData: No part or no station is called so.
+    """
+    if part.object not in database.objects or part.station not in database.stations:
+        raise BadData((f"no part is called `{part.object}`, or no station `{part.station}`",))
+    number = database.objects[part.object]
+    length, width, height = part.size_mm or database.sizes[number]
+    station = database.stations[part.station]
+    at_mm = station.frame.point((part.x_mm, part.y_mm, height / 2))
+    turn = about_z(station.yaw_deg + part.yaw_deg)
+    return Lying(number, Body((length, width, height), at_mm, turn, part.density_kg_m3, part.friction))

@@ -7,10 +7,11 @@ watches the run, and what keeps one that was stopped.
 from typing import TYPE_CHECKING
 
 from rcsc.base.host.cache import open_cache
+from rcsc.run.orders.script import script_path
 from rcsc.run.orders.stopped import StoppedRuns
 from rcsc.run.plant.staged import Setup, Staged
 from rcsc_cell.workstation.orders import KINDS
-from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places, script_path
+from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places
 from rcsc_cell.workstation.script import read_script
 from rcsc_cell.workstation.station import workstation
 
@@ -43,17 +44,17 @@ def _staged(setup: Setup, backend: "Backend") -> Staged:
     if not setup.script:
         return Staged((plant(database, backend, seed=setup.seed),), database.queries)
     from rcsc_cell.cell.reach import checked
-    from rcsc_cell.episodes.witness import Timed, Witness
+    from rcsc_cell.episodes.witness import Witness, timed
 
     folder = setup.spec.folder
-    rows = read_script(script_path(setup.script, folder / "system.toml"))
+    rows = read_script(script_path(setup.script, folder))
     station = workstation(rows, database.locations, setup.signs["task"], safe_places(database))
     checked(database, open_cache(folder))
-    timed = Timed(plant(database, backend, seed=setup.seed))
+    world = timed(plant(database, backend, seed=setup.seed))
     return Staged(
-        (timed,),
+        (world,),
         database.queries,
         station,
-        witness=lambda run: Witness(run, timed=timed, database=database),
+        witness=lambda run: Witness(run, plant=world, database=database),
         resume=StoppedRuns(setup.system, database.locations, KINDS),
     )

@@ -5,16 +5,14 @@ In: a run and its plant. Out: figures and pictures. It looks at the truth, and n
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 from rcsc.run.plant.models.solid import solid
-from rcsc.run.plant.space import Space as SpaceOfPlant
 from rcsc.run.signature import Values
 from rcsc.run.system import System
 from rcsc.views.pages.report import Figure, Placement, Story
 from rcsc.views.pages.witness import RunWitness
 from rcsc_cell.cell.arm import margins_deg, solve
-from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.physical import Physical
 from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
@@ -22,6 +20,7 @@ from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
+from rcsc_cell.workstation.rest import PUTS
 from rcsc_cell.workstation.station import RowResult, Workstation
 
 DRAWN = (
@@ -31,53 +30,25 @@ DRAWN = (
     "gripper.hand.force_n",
 )
 """Curves of the report: height and speed of the hand, opening and force of its fingers."""
-PUTS = ("release", "transfer", "clear")
-"""Commands after which a part lies somewhere."""
 
 
 @dataclass(slots=True)
-class Timed:
-    """Something outside the levels, and how long it took."""
+class Timed(Plant):
+    """A plant that knows how long its cycles took."""
 
-    inner: Plant
-    seconds: float = 0.0
+    seconds: float = field(default=0.0, kw_only=True)
 
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """Run one cycle."""
         begun = time.perf_counter()
-        given = self.inner.step(tick, latest)
+        given = Plant.step(self, tick, latest)
         self.seconds += time.perf_counter() - begun
         return given
 
-    def space(self) -> SpaceOfPlant:
-        """Return the plant's."""
-        return self.inner.space()
 
-    @property
-    def faults(self) -> Faults:
-        """The plant's."""
-        return self.inner.faults
-
-    @property
-    def grades(self) -> Mapping[str, tuple[float, float]]:
-        """The plant's."""
-        return self.inner.grades
-
-    def switch(self, fault: str, *, on: bool) -> None:
-        """Switch a fault of the plant's on or off."""
-        self.inner.switch(fault, on=on)
-
-    def grade(self, fault: str, strength: float) -> None:
-        """Switch a fault of the plant's on, with a strength."""
-        self.inner.grade(fault, strength)
-
-    def state(self) -> dict[str, object]:
-        """Return the plant's."""
-        return self.inner.state()
-
-    def restore(self, state: Mapping[str, object]) -> None:
-        """The plant's."""
-        self.inner.restore(state)
+def timed(plant: Plant) -> Timed:
+    """Return the plant, timed from now on."""
+    return Timed(*(getattr(plant, name.name) for name in fields(Plant)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +72,12 @@ class Witness(RunWitness):
     """Watches every cycle of a run in the cell; in `System.watch`.
 
     Attributes:
-        timed: The plant, timed.
+        plant: It is timed.
         database: The cell's.
         margins_deg: The least so far.
     """
 
-    timed: Timed = field(kw_only=True)
+    plant: Timed = field(kw_only=True)
     database: Database = field(kw_only=True)
     drawn: Sequence[str] = DRAWN
     margins_deg: tuple[float, ...] = (360.0,) * 6
@@ -118,11 +89,6 @@ class Witness(RunWitness):
         if isinstance(mechanism, Physical):
             pictures["solid"] = lambda: solid(mechanism.model, mechanism.data)
         self.pictures = pictures
-
-    @property
-    def plant(self) -> Plant:
-        """The plant."""
-        return self.timed.inner
 
     def look(self) -> None:
         """Keep the least distances of the joints from their limits."""
@@ -156,7 +122,7 @@ class Witness(RunWitness):
         story = RunWitness.story(self, title, seconds)
         return replace(
             story,
-            timing=[*story.timing[:-1], Figure("of it the plant", self.timed.seconds, "s"), story.timing[-1]],
+            timing=[*story.timing[:-1], Figure("of it the plant", self.plant.seconds, "s"), story.timing[-1]],
             placements=[
                 Placement(
                     f"{placed.part} at {placed.place}",

@@ -25,6 +25,8 @@ COUNTED: Mapping[str, str] = {
 """Where TASK counts what lies on the buffer (Fig. 9)."""
 LETS_GO = frozenset({"drops", "slips"})
 """Faults that take a part out of the fingers."""
+TAKES = frozenset({"acquire", "move", "transfer"})
+"""Commands that may take a part."""
 APART_MM = 10.0
 """Fingers that are nearer hold nothing: a part that closed ones (`close_grip`, 5 mm) press on touches both pads, too."""
 

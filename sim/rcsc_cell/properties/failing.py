@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from rcsc_cell.cell.mujoco_model import DENSITY_KG_M3
 from rcsc_cell.database.ask import Database
-from rcsc_cell.properties.cycle import Command, CycleState
+from rcsc_cell.properties.cycle import TAKES, Command, CycleState
 
 ROBOT = frozenset({"move", "loc", "robot"})
 HAND = frozenset({"move", "loc", "pic", "grip"})
@@ -37,7 +37,6 @@ REASONS: Mapping[str, frozenset[str]] = {
     "late": frozenset({"move", "loc", "pic", "robot", "grip"}),
 }
 """Which reasons TASK may give because of a fault (Fig. 9: cmd, move, loc, pic, state, buf; RELEASE gives the reason of the level below)."""
-TAKES = frozenset({"acquire", "move", "transfer"})
 SETTLE_TICKS = 25
 """After FAIL is reported the robot is stopped within these: a second."""
 STILL_RAD = 0.004

@@ -5,7 +5,8 @@ from typing import ClassVar
 
 from rcsc_cell.cell.arm import plate
 from rcsc_cell.database.ask import Database, Station
-from rcsc_cell.properties.cycle import COUNTED, LETS_GO, Command, CycleState
+from rcsc_cell.properties.cycle import COUNTED, LETS_GO, TAKES, Command, CycleState
+from rcsc_cell.workstation.rest import PUTS
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""
@@ -33,8 +34,6 @@ ASIDE = frozenset({"pushed", "shifted_mm", "noisy"})
 SLIDES_TICKS = 25
 """How much later a part that slips is out of the fingers."""
 REST_RAD = 0.002
-MOVES = frozenset({"acquire", "move", "transfer"})
-PUTS = frozenset({"release", "transfer", "clear"})
 
 
 class DoneTrue:
@@ -132,7 +131,7 @@ class DoneTrue:
             return f"the fingers are {cycle.opening_mm:.1f} mm apart, not {grip_mm:.1f}"
         kind = self._objects[cycle.held[0]]
         source = command.source or (command.here if command.name == "acquire" else 0)
-        seen = bool(cycle.database.place(source)[1]) and command.name in MOVES
+        seen = bool(cycle.database.place(source)[1]) and command.name in TAKES
         return f"the hand holds a `{kind}`, not a `{believed}`" if seen and kind != believed else None
 
     def _put(self, cycle: CycleState, command: Command) -> str | None:

@@ -1,44 +1,17 @@
-"""A cell ready to run: system, database, workstation and what else stands outside the levels.
+"""What a system must have to fit the cell, and its database, made of the data where that has changed.
 
-In: the description's path, a script. Out: a `ScriptDraft` that is stepped to its end.
+In: a description and the signatures of its levels. Out: a `Database`, or what does not fit.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
 
 from rcsc.base.host.described import Document
-from rcsc.run.description import BadDescription, Description, description, needs_data
-from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.description import BadDescription, Description, needs_data
 from rcsc.run.signature import Leaf, Signature
-from rcsc.run.system import Kind, Outside, System, assemble, signatures
 from rcsc_cell.database.ask import Database, fresh, open_database
 from rcsc_cell.database.build import Limit, build, digest
-from rcsc_cell.workstation.script import ROBOT, ScriptRow, read_script
-from rcsc_cell.workstation.station import RowResult, Workstation, workstation
-
-
-@dataclass(slots=True)
-class ScriptDraft:
-    """A script in the making.
-
-    Attributes:
-        station: The first of what stands outside.
-    """
-
-    system: System
-    station: Workstation
-    database: Database
-
-    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult]:
-        """Run to the end of the script, or until TASK has paused after a failure; yield each result as it comes.
-
-        Raises:
-            StateTableError: A level met a fault that the proofs exclude.
-        """
-        for result in ScriptedRun(self.system, self.station).steps(most):
-            yield cast(RowResult, result)
+from rcsc_cell.workstation.script import ROBOT
 
 
 def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
@@ -156,42 +129,8 @@ def database_of(system: Description, signs: Mapping[str, Signature], path: Path 
     return open_database(kept)
 
 
-def script_path(name: str, system: Path) -> Path:
-    """Find the script that a name means: a file, or one of those beside the system."""
-    path = Path(name)
-    return path if path.suffix == ".csv" or path.is_file() else system.parent / "scripts" / f"{name}.csv"
-
-
 def safe_places(database: Database) -> dict[str, str]:
     """Return the safe location of each location that has one, by name."""
     names = {number: name for name, number in database.locations.items()}
     safe = {name: int(database.place(number)[4]) for name, number in database.locations.items()}
     return {name: names[number] for name, number in safe.items() if number}
-
-
-def prepare(
-    path: Path,
-    rows: tuple[ScriptRow, ...] | str,
-    kind: Kind,
-    outside: Callable[[Database], Iterable[Outside]],
-    database: Path | None = None,
-) -> ScriptDraft:
-    """Prepare a cell for its first tick.
-
-    Args:
-        path: The system's description.
-        rows: The script, or its name.
-        kind: Which executors run.
-        outside: Makes what stands outside, from the database: robot, hand, camera, vise and machine.
-        database: A database to be used as it is.
-
-    Raises:
-        BadDescription, BadData, BadScript, NotBuilt: Something is not in order; nothing has moved.
-    """
-    system = description(path)
-    signs = signatures(system)
-    needs_cell(system, signs)
-    held = database_of(system, signs, database)
-    script = read_script(script_path(rows, path)) if isinstance(rows, str) else rows
-    station = workstation(script, held.locations, signs["task"], safe_places(held))
-    return ScriptDraft(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)
