@@ -5,14 +5,12 @@ orders that stand. Out: values to start from.
 What is adopted is the program's (`rcsc.lang.restart`), the same for the proof.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias, assert_never
+from typing import assert_never
 
-from rcsc.lang import restart as lang
-from rcsc.lang.restart import NUMBERS as NUMBERS  # noqa: PLC0414  # of what is adopted, too
-from rcsc.lang.restart import Adopted
+from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
 from rcsc.run.buffers import Buffers
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Signature, Value, Values
@@ -84,9 +82,19 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
         values: All leaves and the trace; states and outputs initial.
         stands: What its own buffers hold, of `standing`.
     """
-    now, standing_ = list(values), stands or {}
-    for start in adoption(sign):
-        now[start.at] = _started(start, now, standing_)
+    now, stood = list(values), stands or {}
+    for at, adopts in sign.restart.items():
+        match adopts:
+            case Fixed(value):
+                now[at] = value
+            case SameAs(leaf):
+                now[at] = now[sign.index[leaf]]
+            case After(leaf):
+                now[at] = (int(stood.get(at, now[sign.index[leaf]])) + 1) % NUMBERS
+            case Stands():
+                now[at] = stood.get(at, now[at])
+            case _:
+                assert_never(adopts)
     return tuple(now)
 
 
@@ -105,68 +113,3 @@ def unlike(sign: Signature, values: Values, given: Values) -> dict[int, Value]:
     return {
         at: ways[0][at] for at in range(len(leaves)) if all(repr(way[at]) != repr(values[at]) for way in ways)
     }
-
-
-@dataclass(frozen=True, slots=True)
-class Fixed:
-    """The leaf at a position starts with a value."""
-
-    at: int
-    value: Value
-
-
-@dataclass(frozen=True, slots=True)
-class Copied:
-    """It starts with what another leaf holds."""
-
-    at: int
-    source: int
-
-
-@dataclass(frozen=True, slots=True)
-class Numbered:
-    """It starts with the number after that of the order that stands, or else after the one in the leaf `echo`; modulo `NUMBERS`."""
-
-    at: int
-    echo: int
-
-
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """It starts with what stands of it in the level's own buffer, or else as it is initially."""
-
-    at: int
-
-
-Start: TypeAlias = Fixed | Copied | Numbered | Standing
-
-
-def adoption(sign: Signature) -> tuple[Start, ...]:
-    """Return how leaves start anew that do not start with their initial values, in the order in which they are set."""
-    return tuple(_start(sign, at, adopts) for at, adopts in sign.restart.items())
-
-
-def _start(sign: Signature, at: int, adopts: Adopted) -> Start:
-    match adopts:
-        case lang.Fixed(value):
-            return Fixed(at, value)
-        case lang.SameAs(leaf):
-            return Copied(at, sign.index[leaf])
-        case lang.After(leaf):
-            return Numbered(at, sign.index[leaf])
-        case lang.Stands():
-            return Standing(at)
-
-
-def _started(start: Start, now: Sequence[Value], stands: Mapping[int, Value]) -> Value:
-    match start:
-        case Fixed(value=value):
-            return value
-        case Copied(source=source):
-            return now[source]
-        case Numbered(at=at, echo=echo):
-            return (int(stands.get(at, now[echo])) + 1) % NUMBERS
-        case Standing(at=at):
-            return stands.get(at, now[at])
-        case _:
-            assert_never(start)

@@ -32,7 +32,7 @@ from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Rendered, render
 from rcsc.code.emit.translate import constant
 from rcsc.lang.model import Admit, Array, Bool, Enum, Real, Record, Scalar, Type, Value
-from rcsc.run.adopt import NUMBERS, Copied, Fixed, Numbered, Standing, Start, adoption
+from rcsc.lang.restart import NUMBERS, Adopted, After, Fixed, SameAs, Stands
 from rcsc.run.link.wiring import BETWEEN, IN, OUT, OWN, TICK, Buffer, End, LevelProgram, Linked, LinkedLevel
 from rcsc.run.signature import REALS
 
@@ -222,10 +222,11 @@ class _Maker:
     def _anew(self, level: LinkedLevel) -> Iterator[Stmt]:
         """Yield what `rcsc.run.adopt.restart` does without a checkpoint."""
         state, program = f"s->{level.member}", level.program.names.program
-        starts = adoption(level.program.sign)
+        starts = level.program.sign.restart
         yield Let(f"{program}_t", "now", Name(state))
         yield Let("int32_t", "at", DONE)
-        if any(isinstance(start, Numbered) for start in starts):
+        numbered = [at for at, adopts in starts.items() if isinstance(adopts, After)]
+        if numbered:
             yield Let("uint64_t", "number")
         yield Do(Invoke(f"{program}_init", (Name(f"&{state}"),)))
         for word in (*TRACE, *level.program.names.failed):
@@ -233,42 +234,40 @@ class _Maker:
         if level.takes or level.questions:
             yield self._own("take", level)
         yield Set(Name("now"), Name(state))
-        for start in starts:
-            yield from self._started(level, start)
+        for at, adopts in starts.items():
+            yield from self._started(level, at, adopts)
         check = Set(AT, Invoke(f"{program}_check", (Name("&now"),)))
-        narrow = any(
-            isinstance(start, Numbered) and _greatest(level, start) < NUMBERS - 1 for start in starts
-        )
+        narrow = any(_greatest(level, at) < NUMBERS - 1 for at in numbered)
         yield when(infix("<", AT, Constant(0)), check) if narrow else check
         yield when(infix("<", AT, Constant(0)), Set(Name(state), Name("now")))
         yield Leave(AT)
 
-    def _started(self, level: LinkedLevel, start: Start) -> Iterator[Stmt]:
+    def _started(self, level: LinkedLevel, at: int, adopts: Adopted) -> Iterator[Stmt]:
         program = level.program
-        leaf = program.sign.leaves[start.at]
-        place = Name(f"now.{program.path(start.at)}")
-        match start:
-            case Fixed(value=value):
-                yield Set(place, _constant(program, program.plan.program.variables[start.at].type, value))
-            case Copied(source=source):
-                given = Name(f"now.{program.path(source)}")
-                same = program.sign.leaves[source].c_type == leaf.c_type
+        leaf, index = program.sign.leaves[at], program.sign.index
+        place = Name(f"now.{program.path(at)}")
+        match adopts:
+            case Fixed(value):
+                yield Set(place, _constant(program, program.plan.program.variables[at].type, value))
+            case SameAs(source):
+                given = Name(f"now.{program.path(index[source])}")
+                same = program.sign.leaves[index[source]].c_type == leaf.c_type
                 yield Set(place, given if same else Cast(leaf.c_type, given))
-            case Numbered(at=at, echo=echo):
+            case After(echo):
                 number = Name("number")
-                yield Set(number, Cast("uint64_t", Name(f"now.{program.path(echo)}")))
+                yield Set(number, Cast("uint64_t", Name(f"now.{program.path(index[echo])}")))
                 if standing := _standing(level, at):
                     yield when(infix("!=", TICKS, FIRST), Set(number, Cast("uint64_t", Name(standing))))
                 next_, many = Constant(1, "uint64_t"), Constant(NUMBERS, "uint64_t")
                 yield Set(number, infix("%", infix("+", number, next_), many))
-                if (greatest := _greatest(level, start)) < NUMBERS - 1:
+                if (greatest := _greatest(level, at)) < NUMBERS - 1:
                     yield when(infix(">", number, Constant(greatest, "uint64_t")), Set(AT, Constant(at)))
                 yield Set(place, Cast(leaf.c_type, number))
-            case Standing(at=at):
+            case Stands():
                 if standing := _standing(level, at):
                     yield when(infix("!=", TICKS, FIRST), Set(place, Name(standing)))
             case _:
-                assert_never(start)
+                assert_never(adopts)
 
     def _kept(self, level: LinkedLevel) -> Iterator[Stmt]:
         """Yield what `rcsc.run.adopt.restart` does with a checkpoint: only leaves are restored, not the trace."""
@@ -383,9 +382,9 @@ def _constant(program: LevelProgram, kind: Scalar, value: Value) -> Code:
     return constant(kind, value) if isinstance(kind, Bool | Real) else Constant(value, c_type(kind))
 
 
-def _greatest(level: LinkedLevel, start: Numbered) -> int:
-    """Return the greatest number that the leaf's type in C holds."""
-    return type_bounds(level.program.sign.leaves[start.at].c_type)[1]
+def _greatest(level: LinkedLevel, at: int) -> int:
+    """Return the greatest number that the type of a leaf in C holds."""
+    return type_bounds(level.program.sign.leaves[at].c_type)[1]
 
 
 def _standing(level: LinkedLevel, at: int) -> str:

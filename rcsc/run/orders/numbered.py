@@ -7,9 +7,8 @@ repeats it. Numbers wrap; a report is an answer only if it repeats the number.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from rcsc.lang.restart import NUMBERS
 from rcsc.run.signature import Value, Values
-
-NUMBERS = 65536
 
 Latest = Callable[[str], Values | None]
 

@@ -17,7 +17,7 @@ from rcsc.base.host.tools import Absent, BuildFailed
 from rcsc.code.testing.coverage.case import outside_of
 from rcsc.driver.settings import silent
 from rcsc.lang.model import Array, Bool
-from rcsc.run.adopt import Copied, Numbered, adoption
+from rcsc.lang.restart import After, SameAs
 from rcsc.run.link import Linked
 from rcsc.run.link.wiring import End, LinkedLevel, Question
 from rcsc.views.evidence import analysers
@@ -101,9 +101,8 @@ def _fresh(whole: Whole, point: Point) -> str:
     for level in whole.system.levels:
         if point.function == f"{whole.system.word}_restart_{level.member}":
             program, leaves = level.program.plan.program, level.program.sign.leaves
-            given = (
-                start.at for start in adoption(level.program.sign) if isinstance(start, Copied | Numbered)
-            )
+            adopted = level.program.sign.restart.items()
+            given = (at for at, adopts in adopted if isinstance(adopts, SameAs | After))
             narrow = (
                 at
                 for at in given

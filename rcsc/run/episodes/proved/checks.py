@@ -12,13 +12,13 @@ from functools import partial
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Value, pending
+from rcsc.lang.restart import NUMBERS
 from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import EXTERN, FLAG, Now, Reader, told
 from rcsc.run.signature import FAULTS, STOPPED, Values
 
 Check = Callable[[Now], str]
 """What is wrong in a cycle; empty for nothing."""
-NUMBERS = 65536
 _NONE, _SEVERAL = FAULTS.index("no line matches"), FAULTS.index("several lines match")
 _DONE = (0, EXTERN, STOPPED)
 """Faults of a cycle that took its inputs and that no proof excludes."""

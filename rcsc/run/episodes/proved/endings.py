@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 
 from rcsc.lang.interpret import UNDEFINED, Fault, cycle
 from rcsc.lang.model import Value
-from rcsc.lang.restart import ECHO, ECHOED, NUMBER, STATUS
+from rcsc.lang.restart import ECHO, ECHOED, NUMBER, NUMBERS, STATUS
 from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import Now, Reader
 from rcsc.run.signature import Leaf, Values
 
-NUMBERS = 65536
 MOST_CYCLES = 400
 """Of one command that are remembered."""
 MOST_ROUNDS = 4
