@@ -21,9 +21,9 @@ extern procedures do; logs and symbol files may come from anybody and are read w
 level's state; it does not depend on the number of lines.
 
 Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flows: `declared_plant` and `description`, `links` (declared
-alike at both ends), `signature`, `executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run),
-`buffers`, `levels`, `adopt` (starting again), `faults` (of plants), `system`; rooms `orders` (scripts), `plant` (what moves), `log`,
-`unset` (what had no value yet), `processes`, `link` (the C of a whole system), `episodes` and `campaign` (many of them).
+alike at both ends), `signature`, `executors` (no forced ones), `answers` (what externs give in a finding's run), `buffers`, `levels`,
+`adopt` (starting again), `faults` (of plants), `system`, `unset` (which numbers nobody has set yet); rooms `orders` (scripts), `plant`
+(what moves), `log`, `processes`, `link` (the C of a whole system), `episodes` and `campaign` (many of them).
 """
 
 import sys

@@ -1,7 +1,8 @@
 """Generated executors behind one interface: Python modules, and C built into one shared library.
 
 In: the generated folder and signatures. Out: executors that hold one state each. Values go in and out as tuples in declared
-order; both kinds give the same values, bit for bit.
+order; both kinds give the same values, bit for bit. Those that were made by force of tables that do not prove, to run a finding, bear a
+mark (`host.files.write.UNPROVED`), and are refused.
 """
 
 import ctypes
@@ -20,10 +21,13 @@ from types import CodeType, ModuleType
 from typing import Protocol
 
 from rcsc.base.diagnostics.coded import USERS_FAILURES, CodedError, raised
+from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host import children
 from rcsc.base.host.files.names import BadName
 from rcsc.base.host.files.read import Malformed, content
-from rcsc.run.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
+from rcsc.base.host.files.write import UNPROVED
+from rcsc.run.description import BadDescription, Description
+from rcsc.run.signature import FORMATS, LevelSign, Signature, Value, Values, generated_files, sources_of
 
 TYPES = "_types.h"
 """What the name of a header of types ends with, which programs share."""
@@ -279,3 +283,31 @@ def _padded(fields: Sequence[tuple[int, str]], size: int) -> struct.Struct:
         text += "x" * (place - at) + form
         at = place + struct.calcsize(form)
     return struct.Struct(text + "x" * (size - at))
+
+
+# --- of tables that are not proved ---
+
+
+class UnprovedExecutors(BadDescription):
+    """Generated files that bear the mark of unproved tables; lists them."""
+
+    code = Code.EXECUTORS_NOT_PROVED
+    helps = ("mend the tables, then `rcsc compile`",)
+
+
+def marked(system: Description) -> tuple[Path, ...]:
+    """Return the generated files of the system's programs that bear the mark, wherever in their text."""
+    mark = UNPROVED.encode()
+    programs = dict.fromkeys(spec.program for spec in system.levels)
+    files = (path for name in programs for path in generated_files(system.generated, name))
+    return tuple(path for path in files if path.is_file() and mark in content(path))
+
+
+def refuse_unproved(system: Description) -> None:
+    """Refuse unproved executors before anything moves.
+
+    Raises:
+        UnprovedExecutors: A generated file bears the mark.
+    """
+    if paths := marked(system):
+        raise UnprovedExecutors(f"`{paths[0]}` is made of tables that are not proved, to run a finding")

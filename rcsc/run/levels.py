@@ -197,7 +197,7 @@ class RunningLevel:
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
         """Table and line of all that the last cycle ran, in order; if it was ended, the table tried last is there without a line."""
-        return (*self.sign.lines_before(self.level, self.values), (self.table, self.line))
+        return self.sign.lines_of(self.level, self.values)
 
     @property
     def ran(self) -> str:
@@ -223,7 +223,7 @@ class RunningLevel:
     @property
     def fault(self) -> int:
         """The fault of the last cycle; 0 for none."""
-        return int(self.values[len(self.sign.leaves) + 1])
+        return self.sign.fault(self.values)
 
 
 def running_level(

@@ -294,7 +294,7 @@ class Signature:
 
     def table_of(self, level: LevelSign, values: Values) -> str:
         """Return the table that the level ran in the cycle that left these values; of several the last, or the one that ended the cycle."""
-        if level.stages and int(values[len(self.leaves) + 1]) in _ENDED_BY_A_TABLE:
+        if level.stages and self.fault(values) in _ENDED_BY_A_TABLE:
             names = (self._chosen(stage, values) for stage in level.stages)
             ended = (
                 name
@@ -322,15 +322,29 @@ class Signature:
             (name, self.tables[name][at - 1]) for name, at in ran if 0 < at <= len(self.tables.get(name, ()))
         )
 
+    def lines_of(self, level: LevelSign, values: Values) -> tuple[tuple[str, str], ...]:
+        """Return table and line of all that the cycle ran, in order; where it was ended, the table tried last has no line."""
+        last = self.table_of(level, values), self.line_of(level, values)
+        return (*self.lines_before(level, values), last)
+
     def begun(self, values: Values) -> bool:
         """Tell whether the cycle that left these values ran: it did not where an input or the state was refused."""
-        return int(values[len(self.leaves) + 1]) not in _NOT_BEGUN
+        return self.fault(values) not in _NOT_BEGUN
 
     def _chosen(self, choice: LevelSign | StageSign, values: Values) -> str:
         return choice.table or choice.tables.get(int(values[self.index[choice.by]]), "?")
 
     def _kept(self, stage: StageSign, table: str, values: Values) -> int:
         return int(values[self.index[stage.kept[table]]]) if table in stage.kept else 0
+
+    def fault(self, values: Values) -> int:
+        """Return the fault of the cycle that left these values; 0 for none."""
+        return int(values[len(self.leaves) + 1])
+
+    def fault_word(self, values: Values) -> str:
+        """Return the fault of the cycle that left these values in a word; `none` for none."""
+        fault = self.fault(values)
+        return FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"
 
     def fault_at(self, values: Values) -> str:
         """Return the subject of a cycle's fault: the refused leaf, or the assumption; empty for none."""
@@ -346,8 +360,7 @@ class Signature:
     def fault_text(self, values: Values) -> str:
         """Return a fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
-        word = FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"
-        about = self.fault_at(values)
+        word, about = self.fault_word(values), self.fault_at(values)
         if not about:
             return word
         if fault == STOPPED:
@@ -356,7 +369,7 @@ class Signature:
 
     def witness(self, table: str, values: Values) -> str:
         """Return the inputs of a table that ended the cycle by a fault: `width` = 9, `new` = true; empty for other faults."""
-        if int(values[len(self.leaves) + 1]) not in _ENDED_BY_A_TABLE:
+        if self.fault(values) not in _ENDED_BY_A_TABLE:
             return ""
         seen = ((name, self.index[name]) for name in self.sees.get(table, ()) if name in self.index)
         return ", ".join(f"`{name}` = {self.leaves[at].shown(values[at])}" for name, at in seen)

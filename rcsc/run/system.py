@@ -12,11 +12,10 @@ from rcsc.base.host.described import Document, KeyPath, nearest
 from rcsc.run.adopt import Restarted, restart
 from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.description import BadDescription, Description
-from rcsc.run.executors import CExecutor, Executor, PythonExecutor, build
+from rcsc.run.executors import CExecutor, Executor, PythonExecutor, build, refuse_unproved
 from rcsc.run.levels import Query, RunningLevel, misfit, running_level
 from rcsc.run.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
 from rcsc.run.signature import Signature, Values, generated_files, signature
-from rcsc.run.unproved import refuse_unproved
 
 Kind = Literal["c", "python"]
 

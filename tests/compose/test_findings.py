@@ -36,10 +36,10 @@ from rcsc.lang.model import LineName, Program, Table, Value, VariableName, key_b
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.decide import prove_table
 from rcsc.run.description import Description, description
+from rcsc.run.executors import UnprovedExecutors, marked
 from rcsc.run.log.read import read
 from rcsc.run.log.replay import Replay
 from rcsc.run.system import assemble
-from rcsc.run.unproved import UnprovedExecutors, marked
 from tests.support.programs.stages import shipped
 from tests.support.programs.systems import SYSTEM, alone, small_level, small_system, small_text
 from tests.support.programs.texts import edit_file, edited, without_row

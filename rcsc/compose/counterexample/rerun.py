@@ -4,7 +4,7 @@ In: transition systems, a system's description, and a run as the interpreter did
 `rcsc replay` steps, and a check that the Python and the C executors leave in every cycle what the interpreter left.
 
 If a program is not proved, or is a variant under another rule than the language's (`variants`), its executors are made by force:
-by the same emitters, with every file marked (`host.files.write.UNPROVED`), so that no cell runs it (`run.unproved`).
+by the same emitters, with every file marked (`host.files.write.UNPROVED`), so that no cell runs it (`run.executors`).
 """
 
 from collections import deque

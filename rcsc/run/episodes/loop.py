@@ -20,6 +20,7 @@ from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Field, Stand, stand
 from rcsc.run.episodes.subordinates import subordinates
+from rcsc.run.executors import refuse_unproved
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.orders.numbered import Latest
@@ -30,7 +31,6 @@ from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged
 from rcsc.run.signature import STOPPED, Value, Values
 from rcsc.run.system import Outside, System, check_answered, executors
-from rcsc.run.unproved import refuse_unproved
 
 COOL_TICKS = 30
 """Watched after the last order has ended."""

@@ -20,7 +20,7 @@ from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.schema import ROS
 from rcsc.run.log.states import LogColumn, columns, plain
 from rcsc.run.signature import Value, Values
-from rcsc.run.unset.since import LevelSeen, Unsets
+from rcsc.run.unset import LevelSeen, Unsets
 
 Rows = Iterator[tuple[int, Mapping[str, Values]]]
 
@@ -49,8 +49,7 @@ def _coverage(level: LoggedLevel) -> Iterator[Coverage]:
     cycles = iter(level.track)
     next(cycles)  # the state that recording started from
     for _, values in cycles:
-        counts[level.sign.table_of(level.level, values), level.sign.line_of(level.level, values)] += 1
-        counts.update(level.sign.lines_before(level.level, values))
+        counts.update(level.sign.lines_of(level.level, values))
     for table in level.level.every_table:
         lines = level.sign.tables.get(table, ())
         yield Coverage(level.name, table, {line: counts[table, line] for line in lines})

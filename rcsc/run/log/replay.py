@@ -198,8 +198,7 @@ def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
 
 
 def _line(sign: Signature, level: LevelSign, values: Values) -> str:
-    last = sign.table_of(level, values), sign.line_of(level, values) or "none"
-    return ", ".join(f"{table} line {line}" for table, line in (*sign.lines_before(level, values), last))
+    return ", ".join(f"{table} line {line or 'none'}" for table, line in sign.lines_of(level, values))
 
 
 @dataclass(slots=True)

@@ -15,16 +15,10 @@ TRACED = ("table", "line", "fault", "fault_at", "assumptions_failed")
 """What a cycle leaves beside the leaves; a leaf of the same name hides it."""
 
 
-def fault_of(sign: Signature, values: Values) -> str:
-    """What stopped the cycle; `none` for nothing."""
-    at = int(values[len(sign.leaves) + 1])
-    return FAULTS[at] if 0 <= at < len(FAULTS) else f"{at}?"
-
-
 def traced(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
     """Return the trace in words, by name."""
     texts = (
-        sign.table_of(level, values), sign.line_of(level, values), fault_of(sign, values),
+        sign.table_of(level, values), sign.line_of(level, values), sign.fault_word(values),
         sign.fault_at(values), " ".join(sign.failures(values)),
     )  # fmt: skip
     return dict(zip(TRACED, texts, strict=True))
@@ -38,10 +32,12 @@ def words(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
 
 def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
     """`table acquire: no line matches`, `table acquire: input refused, `status_in``; empty where the cycle ended well."""
-    if int(values[len(sign.leaves) + 1]) == 0:
+    if not sign.fault(values):
         return ""
     leaf = sign.fault_at(values)
-    return f"table {sign.table_of(level, values)}: {fault_of(sign, values)}" + (f", `{leaf}`" if leaf else "")
+    return f"table {sign.table_of(level, values)}: {sign.fault_word(values)}" + (
+        f", `{leaf}`" if leaf else ""
+    )
 
 
 def witness_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
@@ -105,7 +101,7 @@ def _trace(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
     return (
         LogColumn("table", tables, "", "", lambda values: sign.table_of(level, values)),
         LogColumn("line", ("", *lines), "", "", lambda values: sign.line_of(level, values)),
-        LogColumn("fault", FAULTS, "", "", lambda values: fault_of(sign, values)),
+        LogColumn("fault", FAULTS, "", "", sign.fault_word),
         LogColumn("fault_at", (), "", "", sign.fault_at),
         LogColumn("assumptions_failed", (), "", "", lambda values: " ".join(sign.failures(values))),
     )

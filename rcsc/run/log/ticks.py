@@ -13,7 +13,6 @@ from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.run.description import Wire
 from rcsc.run.log.finding import LoggedCycle
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import fault_of
 from rcsc.run.signature import Leaf, Signature, Values
 
 MOST_KNOWN = 64
@@ -192,7 +191,7 @@ class _Cycle:
     def box(self, told: LoggedCycle | None) -> LevelTick:
         """Return what it shows."""
         sign, level = self.logged.sign, self.logged.level
-        fault, leaf = fault_of(sign, self.after), sign.fault_at(self.after)
+        fault, leaf = sign.fault_word(self.after), sign.fault_at(self.after)
         line, failed = sign.line_of(level, self.after), " ".join(sign.failures(self.after))
         lines = told.matched if told is not None and told.matched else (line,) if line else ()
         above, below = self._exchanges()

@@ -12,17 +12,15 @@ import struct
 import time
 from collections.abc import Iterator, Mapping, Sized
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from rcsc.run.adopt import restart
-from rcsc.run.buffers import Buffers
 from rcsc.run.description import Description
-from rcsc.run.executors import CExecutor, PythonExecutor, build
 from rcsc.run.levels import RunningLevel, StateTableError, running_level
 from rcsc.run.processes.clocks import Clocks, Turn
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.signature import Signature, Values
-from rcsc.run.system import Kind, Outside, signatures
+from rcsc.run.system import Kind, Outside, executors, signatures
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -33,18 +31,6 @@ MOST_TOLD = 4096
 NAP_S = 20e-6
 HEED_S = 0.1
 """A signal does not end a sleep; a period may be long where the system runs slower than the clock."""
-
-
-class Transport(Buffers, Protocol):
-    """Buffers between processes, with checkpoints of the levels: the interface that a network would have to offer."""
-
-    def commit(self, level: str, values: Values) -> None:
-        """Make this the level's checkpoint, and publish every buffer that it gives, in one step."""
-        ...
-
-    def checkpoint(self, level: str) -> Values | NotShared:
-        """Return all leaves and the trace after the level's last cycle; else why there is no checkpoint."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,28 +95,23 @@ class Paced:
             now = time.monotonic()
 
 
-def begin(level: RunningLevel, transport: Transport) -> None:
+def begin(level: RunningLevel, transport: SharedMemoryBuffers) -> None:
     """Continue from the last committed cycle; where that is lost, or ended in a fault, start safely."""
     held = transport.checkpoint(level.name)
     if held is NotShared.BLANK:
         return
-    if isinstance(held, NotShared) or fault_of(level.sign, held):
+    if isinstance(held, NotShared) or level.sign.fault(held):
         restart(level, transport)
     else:
         restart(level, transport, held)
 
 
-def cycle(level: RunningLevel, transport: Transport) -> int:
+def cycle(level: RunningLevel, transport: SharedMemoryBuffers) -> int:
     """Run one cycle of a level; return the fault, 0 for none."""
     level.take(transport)
     fault = level.run()
     transport.commit(level.name, level.values)
     return fault
-
-
-def fault_of(sign: Signature, values: Values) -> int:
-    """Return the fault in which a checkpoint ended; 0 for none."""
-    return int(values[len(sign.leaves) + 1])
 
 
 def serve_level(setting: Setting, name: str, told: "Connection") -> None:
@@ -155,7 +136,7 @@ def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connecti
                 return
 
 
-def _publish(transport: Transport, name: str, values: Values) -> None:
+def _publish(transport: SharedMemoryBuffers, name: str, values: Values) -> None:
     try:
         transport.publish(name, values)
     except struct.error as error:
@@ -203,11 +184,6 @@ def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterat
 def _level(setting: Setting, name: str, sign: Signature) -> RunningLevel:
     system = setting.description
     spec = next(spec for spec in system.levels if spec.name == name)
-    level = sign.level_of(name)
-    executor = (
-        CExecutor(build(system.generated, [sign]), sign, level)
-        if setting.kind == "c"
-        else PythonExecutor(system.generated, sign, level)
-    )
+    executor = executors(system, {name: sign}, setting.kind)[name]
     queries = setting.queries.make() if setting.queries else {}
     return running_level(spec, system, sign, executor, queries)

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rcsc.base.host import children
 from rcsc.run.description import Description
+from rcsc.run.executors import refuse_unproved
 from rcsc.run.processes.clocks import Clocks
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
 from rcsc.run.system import Kind, StateTableError, signatures
-from rcsc.run.unproved import refuse_unproved
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

@@ -15,7 +15,7 @@ from rcsc.run.log.export import unset_from_first
 from rcsc.run.log.read import Log
 from rcsc.run.signature import Signature, Values
 from rcsc.run.system import System
-from rcsc.run.unset.since import LevelSeen, Unsets
+from rcsc.run.unset import LevelSeen, Unsets
 
 Names = Mapping[str, frozenset[str]]
 """By level."""

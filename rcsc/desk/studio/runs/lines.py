@@ -8,7 +8,6 @@ from typing import Any
 
 from rcsc.desk.studio.runs.history import History
 from rcsc.run.log.read import LoggedLevel
-from rcsc.run.log.states import fault_of
 from rcsc.run.signature import Signature, Values
 
 MOST_CHANGES = 20_000
@@ -90,7 +89,7 @@ class Lines:
 
 
 def _stand(logged: LoggedLevel, values: Values) -> Stand:
-    fault = fault_of(logged.sign, values)
+    fault = logged.sign.fault_word(values)
     return (
         logged.sign.table_of(logged.level, values),
         logged.sign.line_of(logged.level, values),

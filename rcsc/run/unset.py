@@ -1,4 +1,20 @@
-"""Follow a run tick by tick, and know which numbers nobody has set yet.
+"""Which numbers nobody has set since a run began: what a picture leaves out, and an export leaves empty.
+
+A number without an initial value of its own starts at 0, because it has to start with something: a pose starts in the middle of the
+plate, where no robot ever was. It is *unset* until
+
+- its value is another than at first;
+- a line ran that may write it, or a procedure that its level runs in each cycle may;
+- for an input: its buffer was published by who stands outside, or by a level that had set it; or the database answered.
+
+So a number is called unset only where nobody can have written it, and not because it is 0: a line that
+writes just that sets it, too. What is written in the tables' own words has a meaning from the start, and is never unset: members of
+enumerations, bools, and what has an initial value. A run that goes on from a state of another, and a log from before symbol
+files said what may set a number, have nothing that is unset.
+
+>>> from rcsc.run.unset import Unsets
+>>> Unsets((), {}).now
+{}
 
 In: the description, each level's signature, and after each tick what ran. Out: by level the places of leaves that are unset.
 """
@@ -28,10 +44,7 @@ class LevelSeen:
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
         """Table and line of each that the cycle ran."""
-        at, table = int(self.values[len(self.sign.leaves)]), self.sign.table_of(self.level, self.values)
-        lines = self.sign.tables.get(table, ())
-        last = ((table, lines[at]),) if 0 <= at < len(lines) else ()
-        return (*self.sign.lines_before(self.level, self.values), *last)
+        return self.sign.lines_of(self.level, self.values)
 
 
 @dataclass(slots=True)
