@@ -19,8 +19,7 @@ from rcsc.front.commands.shared.played import with_ticks
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.executors import PythonExecutor
-from rcsc.run.log.export import csv_text, json_text, unset
-from rcsc.run.log.plot import _series
+from rcsc.run.log.export import _series, csv_text, json_text, unset
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.schema import signature_from, signature_text

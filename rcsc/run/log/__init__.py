@@ -20,7 +20,7 @@ bit for bit; with other tables it says what they would have done.
 Nothing in a log is trusted, compiled or run. What it costs: the bytes of the state a cycle, a second of the run at
 most after a kill. Needs the extra `log`.
 
-Modules, in the order the data flows: `schema` (what a log says of itself), `records` (the chain), `recorder`; `cadence`
-(which records a run has), `read`, `states` (a state in words), `ticks` (a run, tick by tick), `finding` (what a
-finding's log adds), `queries` (conditions, as people type them), `replay`, `export`, `plot`.
+Modules, in the order the data flows: `schema` (what a log says of itself), `records` (the chain), `recorder`; `read`,
+`states` (a state in words), `ticks` (a run, tick by tick), `finding` (what a finding's log adds), `queries` (conditions,
+as people type them), `replay`, `export` (tables and pictures).
 """

@@ -1,12 +1,13 @@
 """A log, read: the whole one, or what a kill left of it.
 
 In: an MCAP file of `rcsc.run.log.recorder`. Out: a `Log`: for each level its signature and what every cycle left. A log may come from
-anybody: whatever it names is checked against what it may be.
+anybody: whatever it names is checked against what it may be, and its records against those of a run: of each level all cycles that its
+period has, and no others. The chain tells damage; this tells what a chain that was made anew does not: rows that are missing.
 """
 
 import struct
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +16,6 @@ from mcap.records import Channel, McapRecord, Message, Metadata
 from rcsc.base.host.files.names import identifier, shown
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, wire_of
-from rcsc.run.log import cadence
 from rcsc.run.log.finding import FINDING, LoggedFinding, finding_of
 from rcsc.run.log.records import ChainCheck, Seal, records
 from rcsc.run.log.schema import (
@@ -318,15 +318,47 @@ class _Reading:
     def _check(self, log: Log) -> None:
         """Raises: ValueError: The records are not those of one run."""
         cycles = {level.name: (level.track.ticks, level.level.period_ms) for level in log.levels}
-        cadence.check_named([level.name for level in log.levels], self.signs)
-        cadence.check_begun(ticks for ticks, _ in cycles.values())
+        if sorted(level.name for level in log.levels) != sorted(self.signs):
+            raise ValueError("the levels that it describes are not those that it records")
+        if len({ticks[0] for ticks, _ in cycles.values()}) > 1:
+            raise ValueError("its levels do not begin in one tick")
         if log.finding is None:  # in which levels run when they like
-            cadence.check_cycles(cycles, log.tick_ms, whole=log.complete)
+            _check_cycles(cycles, log.tick_ms, whole=log.complete)
         for level in log.levels:
-            cadence.check_restarts(level.name, [each.tick for each in level.restarts], log.ticks)
+            restarts = [each.tick for each in level.restarts]
+            if any(tick not in log.ticks for tick in restarts) or restarts != sorted(restarts):
+                raise ValueError(
+                    f"level `{level.name}` was started again in other ticks than those of the run"
+                )
 
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]
         level = next(level for level in sign.levels if level.name == name)
         restarts = tuple(self.restarts.get(name, ()))
         return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts)
+
+
+def _check_cycles(cycles: Mapping[str, tuple[Sequence[int], int]], tick_ms: int, *, whole: bool) -> None:
+    """See that each level has its cycles.
+
+    Args:
+        cycles: For each level the ticks of its records, the first that of the state it started from, and its period in ms.
+        tick_ms: Length of a tick.
+        whole: Whether the log has its end; else each may end anywhere.
+
+    Raises:
+        ValueError: One lacks a cycle, or has one that its period has not.
+    """
+    last = max(ticks[-1] for ticks, _ in cycles.values())
+    for name, (ticks, period_ms) in cycles.items():
+        if period_ms % tick_ms:
+            raise ValueError(f"level `{name}` has a period of {period_ms} ms, in ticks of {tick_ms} ms")
+        step, begun = period_ms // tick_ms, ticks[0]
+        due = range(begun + 1 + -begun % step, (last if whole else ticks[-1]) + 1, step)
+        if len(due) != len(ticks) - 1 or any(map(int.__ne__, due, ticks[1:])):
+            had = set(ticks[1:])
+            at = next((tick for tick in due if tick not in had), None)
+            wrong = (
+                f"has no cycle in tick {at}" if at is not None else "has a cycle between those of its period"
+            )
+            raise ValueError(f"level `{name}` {wrong}")

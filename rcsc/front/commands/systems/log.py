@@ -19,7 +19,7 @@ from rcsc.front.commands.shared.systems import NoSystem, system_path
 from rcsc.run.description import NO_DATA, BadDescription, description
 from rcsc.run.log import export
 from rcsc.run.log.export import coverage
-from rcsc.run.log.plot import plot as draw
+from rcsc.run.log.export import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
