@@ -182,12 +182,9 @@ def test_only_the_groups_that_are_seen_are_drawn() -> None:
     assert shown == [3, 3, 3, 0, 0, 0]
 
 
-def test_the_text_is_text_and_the_picture_the_same_again() -> None:
+def test_the_picture_is_the_same_again() -> None:
     model, data = cell('<geom type="sphere" size=".1"/>')
-    svg = solid(model, data, text=["cycle <690> & more", "</text><script>"])
-    said = [element.text for element in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
-    assert said == ["cycle <690> & more", "</text><script>"]
-    assert svg == solid(model, data, text=["cycle <690> & more", "</text><script>"])
+    assert solid(model, data) == solid(model, data)
 
 
 @pytest.mark.parametrize("height", [-0.4, 0.01, 0.2, 3.0])

@@ -10,9 +10,8 @@ from rcsc.front.commands import run
 from rcsc.run.description import BadDescription, description
 from rcsc.run.plant.bind import BadPlant, BoundPlant, Buffer, PlantFailed, plant_page
 from rcsc.run.plant.load import load
-from rcsc.run.plant.models.bindings import Binder
+from rcsc.run.plant.models.bindings import Binder, driven_in
 from rcsc.run.plant.models.model_plant import BoundModel
-from rcsc.run.plant.models.model_units import driven_in
 from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Leaf, Values
 from rcsc.run.system import signatures

@@ -17,14 +17,13 @@ Units are those of SI where nothing is said: what a sensor measures is known by 
 variable's unit and converted exactly. In each tick controls are set, the model makes as many steps as a tick has, and the
 sensors are read; a tick must be a whole number of steps.
 
->>> from rcsc.run.plant.models.model_units import SENSED
+>>> from rcsc.run.plant.models.bindings import SENSED
 >>> SENSED["mjSENS_TOUCH"], SENSED["mjSENS_VELOCIMETER"]
 ('N', 'm/s')
 
 Nothing here is trusted for a proof. What it costs: the steps, and one more evaluation a tick, so that readings are of
 now.
 
-Modules, in the order the data flows: `model_units` (what sensors and actuators measure), `bindings` (names, units and
-ranges checked), `space` (how a model looks, for the studio), `solid` (the faces of its shapes from far to near, as SVG: `shapes`, `order`),
-`model_plant` (what moves).
+Modules, in the order the data flows: `bindings` (names, units and ranges checked), `space` (how a model looks, for the
+studio), `solid` (the faces of its shapes from far to near, as SVG), `model_plant` (what moves).
 """
