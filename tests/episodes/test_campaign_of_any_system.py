@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.front import commands
-from rcsc.run.campaign.any_system import ANY
+from rcsc.run.campaign.choose import ANY
 from rcsc.run.campaign.counterexamples import BadEpisode, again, saved_episode
 from rcsc.run.campaign.rig import EpisodeKind, Rig, digest
 from rcsc.run.campaign.shrink import shrink
@@ -215,7 +215,7 @@ def test_an_episode_imports_no_file_that_it_names(dock: Path, tmp_path: Path) ->
 
 KIND = """
 import dataclasses
-from rcsc.run.campaign.any_system import ANY
+from rcsc.run.campaign.choose import ANY
 
 NONE = 3
 

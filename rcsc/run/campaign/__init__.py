@@ -20,7 +20,7 @@ system are those of `rcsc.run.episodes`; a plant may have its own, as that of th
 
 Trusted: nothing for a proof. What it costs: the episodes; shrinking one tries a bounded number of others.
 
-Modules, in the order the data flows: `rig` (what is played on), `any_system` and `choose` (which kind), `journal`, `shrink`,
+Modules, in the order the data flows: `rig` (what is played on), `choose` (which kind of episodes), `journal`, `shrink`,
 `work` (what a worker does), `worker_pool` (who plays), `runner` (gives out episodes and keeps what comes back),
 `counterexamples`, `summary`.
 """

@@ -12,5 +12,5 @@ A claim says nothing of a run in which something was broken that it takes for gr
 again. What no episode can look at is told, with why. It costs some 0.2 ms a cycle and level.
 
 Modules, in the order the data flows: `claims` (values), `cycles` (what a claim sees), `checks` (a cycle), `endings` (commands that go
-round), `trusts` (what is taken for granted), `watch`.
+round), `watch` (with what is taken for granted).
 """
