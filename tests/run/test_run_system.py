@@ -16,9 +16,9 @@ import pytest
 
 from rcsc.front.commands import run
 from rcsc.run.description import description
-from rcsc.run.orders.operator import RowResult, ScriptedRun, ScriptOperator
+from rcsc.run.orders.operator import ScriptedRun, ScriptOperator
 from rcsc.run.orders.roles import served
-from rcsc.run.orders.script import BadScript, read_script, script_path
+from rcsc.run.orders.script import BadScript, OrderRow, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import System, assemble, signatures
 from rcsc.views.pages.report import page
@@ -404,7 +404,7 @@ def test_the_cycles_of_all_rows_are_those_of_the_run(name: str, here: Path) -> N
     ends = list(run_.steps(2000))
     at = 0
     for end in ends:
-        assert isinstance(end, RowResult)
+        assert isinstance(end.row, OrderRow)
         assert end.first_tick == at
         assert end.row.cycles in (None, end.ticks)
         at += end.ticks

@@ -10,7 +10,7 @@ from rcsc.run.description import description
 from rcsc.run.log.export import coverage
 from rcsc.run.log.read import read
 from rcsc.run.log.recorder import Recorder
-from rcsc.run.orders.operator import RowResult, ScriptedRun
+from rcsc.run.orders.operator import RowResult, ScriptedRun, ScriptRow
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.system import assemble, signatures
 from rcsc.views.pages.log_page import MOST_PICTURES, story_of
@@ -20,7 +20,7 @@ from tests.support.cells import SYSTEM
 from tests.support.films import film_of, unset_in
 
 
-def recorded(folder: Path, text: str, log: Path, most: int = 2000) -> list[RowResult]:
+def recorded(folder: Path, text: str, log: Path, most: int = 2000) -> list[RowResult[ScriptRow]]:
     """What became of each row of a script that the docking robot ran by, recorded."""
     (folder / "mine.csv").write_text(text, encoding="utf-8")
     system = description(folder / "system.toml")
@@ -31,9 +31,7 @@ def recorded(folder: Path, text: str, log: Path, most: int = 2000) -> list[RowRe
     )
     with Recorder(running.system, log) as recorder:
         running.system.watch.append(recorder)
-        ends = list(running.steps(most))
-    assert all(isinstance(end, RowResult) for end in ends)
-    return [end for end in ends if isinstance(end, RowResult)]
+        return list(running.steps(most))
 
 
 def shown(log: Path) -> tuple[Story, str]:

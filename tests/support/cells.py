@@ -9,7 +9,7 @@ from typing import cast
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import description
 from rcsc.run.levels import RunningLevel
-from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.operator import MOST_TICKS, RowResult, ScriptedRun
 from rcsc.run.orders.script import script_path
 from rcsc.run.signature import Value, Values
 from rcsc.run.system import Kind, Outside, System, assemble, signatures
@@ -17,7 +17,7 @@ from rcsc_cell.cell.ready import Lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.workstation.prepared import database_of, needs_cell, safe_places
 from rcsc_cell.workstation.script import ScriptRow, read_script
-from rcsc_cell.workstation.station import RowResult, Workstation, workstation
+from rcsc_cell.workstation.station import Workstation, workstation
 
 REPO = Path(__file__).parents[2]
 SYSTEM = REPO / "tables" / "system.toml"
@@ -41,10 +41,10 @@ class ScriptDraft:
     station: Workstation
     database: Database
 
-    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult]:
+    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult[ScriptRow]]:
         """Run to the end of the script, or until TASK has paused after a failure."""
         for result in ScriptedRun(self.system, self.station).steps(most):
-            yield cast(RowResult, result)
+            yield cast(RowResult[ScriptRow], result)
 
 
 def prepare(

@@ -6,7 +6,7 @@ first command says, which rests.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from rcsc.lang.restart import COMMAND, PROTOCOL
 from rcsc.run.orders.numbered import Latest, Orders
@@ -35,28 +35,24 @@ class ScriptRow(Protocol):
         ...
 
 
-class Result(Protocol):
-    """The result of a row of any script."""
+Row_co = TypeVar("Row_co", bound=ScriptRow, covariant=True)
 
-    @property
-    def row(self) -> ScriptRow:
-        """The row."""
-        ...
 
-    @property
-    def state(self) -> str:
-        """`done`, `failed`, or another state."""
-        ...
+@dataclass(frozen=True, slots=True)
+class RowResult(Generic[Row_co]):
+    """The result of a row of any script.
 
-    @property
-    def reason(self) -> str:
-        """The reason why the row was not done; empty where it was."""
-        ...
+    Attributes:
+        state: `done` where it ended as it was to, `failed`, or another state.
+        reason: The reason why the row was not done; empty where it was.
+        ticks: Number of cycles that the row took, with the one that saw its end: those of all rows add up to those of the run.
+    """
 
-    @property
-    def ticks(self) -> int:
-        """Number of cycles that the row took, with the one that saw its end: those of all rows add up to those of the run."""
-        ...
+    row: Row_co
+    state: str
+    reason: str
+    first_tick: int
+    ticks: int
 
 
 class Operator(Protocol):
@@ -73,7 +69,7 @@ class Operator(Protocol):
         ...
 
     @property
-    def results(self) -> Sequence[Result]:
+    def results(self) -> Sequence[RowResult[ScriptRow]]:
         """Results of the rows that are over."""
         ...
 
@@ -88,7 +84,7 @@ class Operator(Protocol):
         ...
 
     @property
-    def stopped(self) -> Result | None:
+    def stopped(self) -> RowResult[ScriptRow] | None:
         """The result that stopped the script."""
         ...
 
@@ -99,17 +95,6 @@ class Operator(Protocol):
     def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
         """Run one tick."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class RowResult:
-    """The result of a row: `state` is `done` where it ended as it was to, else `failed`; `ticks` as of `Result`."""
-
-    row: OrderRow
-    state: str
-    reason: str
-    first_tick: int
-    ticks: int
 
 
 @dataclass(slots=True)
@@ -123,7 +108,7 @@ class ScriptOperator:
 
     rows: tuple[OrderRow, ...]
     at: int = 0
-    results: list[RowResult] = field(default_factory=list)
+    results: list[RowResult[OrderRow]] = field(default_factory=list)
     _lines: dict[str, Orders] = field(default_factory=dict)
     _since: int = -1  # the tick at which the row began
     _resting: int = -1  # the tick at which the level was told to rest, while that is not answered
@@ -146,7 +131,7 @@ class ScriptOperator:
         return self._resting < 0
 
     @property
-    def stopped(self) -> RowResult | None:
+    def stopped(self) -> RowResult[OrderRow] | None:
         """The result that stopped the script."""
         last = self.results[-1] if self.results else None
         return last if last is not None and last.state != DONE else None
@@ -286,7 +271,7 @@ class ScriptedRun:
             return True
         return any(getattr(part, "over", False) for part in self.system.outside if part is not operator)
 
-    def steps(self, most: int = MOST_TICKS) -> Iterator[Result]:
+    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult[ScriptRow]]:
         """Run to the end, or until the level rests after a failure; yield each result as it comes.
 
         Args:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
+from rcsc.run.orders.operator import RowResult
 from rcsc.run.plant.models.solid import solid
 from rcsc.run.signature import Values
 from rcsc.run.system import System
@@ -21,7 +22,8 @@ from rcsc_cell.database.pose import Vector, minus, pose_of
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.rest import PUTS
-from rcsc_cell.workstation.station import RowResult, Workstation
+from rcsc_cell.workstation.script import ScriptRow
+from rcsc_cell.workstation.station import Workstation
 
 DRAWN = (
     "primitive.from_robot.plate[2]",
@@ -143,7 +145,9 @@ class Witness(RunWitness):
         yield f"joints kept {margins} degrees from their limits"
 
 
-def placements(results: Sequence[RowResult], database: Database, plant: Plant) -> tuple[PartPlace, ...]:
+def placements(
+    results: Sequence[RowResult[ScriptRow]], database: Database, plant: Plant
+) -> tuple[PartPlace, ...]:
     """Return where rows should have put parts, and the nearest part of the kind; the last row counts."""
     put: dict[str, tuple[str, int]] = {}
     held = ""

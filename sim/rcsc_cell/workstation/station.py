@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 from rcsc.base.host.files.plain import plain, read
 from rcsc.run.orders.numbered import Latest, Orders
+from rcsc.run.orders.operator import RowResult
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
@@ -38,17 +39,6 @@ State = Literal["running", "done", "failed", "refused"]
 Now = tuple[State, str]
 """How a row stands, and why it failed."""
 RUNNING: Now = ("running", "")
-
-
-@dataclass(frozen=True, slots=True)
-class RowResult:
-    """The result of a row; `ticks` includes the cycle in which its end was seen."""
-
-    row: ScriptRow
-    state: State
-    reason: str
-    first_tick: int
-    ticks: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +72,7 @@ class Workstation:
     report: tuple[Leaf, ...]
     cell: CellState = field(default_factory=CellState)
     at: int = 0
-    results: list[RowResult] = field(default_factory=list)
+    results: list[RowResult[ScriptRow]] = field(default_factory=list)
     trouble: str = ""
     progress: Progress = field(default_factory=Progress)
     safe: Mapping[str, str] = field(default_factory=dict)
@@ -123,7 +113,7 @@ class Workstation:
         return self._paused < 0
 
     @property
-    def stopped(self) -> RowResult | None:
+    def stopped(self) -> RowResult[ScriptRow] | None:
         """The result that stopped the script."""
         last = self.results[-1] if self.results else None
         return last if last is not None and last.state != "done" and last.row is self.rows[self.at] else None
