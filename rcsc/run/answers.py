@@ -10,18 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeAlias
 
 from rcsc.run.executors import CExecutor, Executor
-from rcsc.run.signature import Value
+from rcsc.run.signature import FORMATS, REALS, Value, c_range
 
 Answers: TypeAlias = Sequence[tuple[str, tuple[Value, ...]]]
 
 MOST = 4096
 """Results of one cycle that a C executor can be told."""
 MODULE, OF = __name__, "of_"
-C_TYPES = {
-    "bool": (0, 1),
-    **{f"uint{bits}_t": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
-    **{f"int{bits}_t": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
-}
 HEAD = f"""
 #include <string.h>
 __attribute__((weak)) uint64_t rcsc_answers[{MOST}];
@@ -68,9 +63,9 @@ def _word(value: Value) -> int:
 
 def fits(c_type: str, value: Value) -> bool:
     """Tell whether a C function of the type can return the value."""
-    if c_type not in C_TYPES:
+    if c_type not in FORMATS or c_type in REALS:
         return True
-    low, high = C_TYPES[c_type]
+    low, high = c_range(c_type)
     return bool(low <= value <= high)
 
 

@@ -13,7 +13,6 @@ import shutil
 import struct
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from operator import attrgetter
 from pathlib import Path
@@ -117,18 +116,11 @@ class PythonExecutor:
             setattr(self._state, self._names[at], value)
 
 
-@dataclass(frozen=True, slots=True)
-class Library:
-    """The C executors of several programs in one shared library."""
-
-    handle: ctypes.CDLL
-
-
-_BUILT: dict[bytes, Library] = {}
+_BUILT: dict[bytes, ctypes.CDLL] = {}
 """What this process has built already, by the text it was built from."""
 
 
-def build(generated: Path, signs: Sequence[Signature]) -> Library:
+def build(generated: Path, signs: Sequence[Signature]) -> ctypes.CDLL:
     """Compile the generated C, once for the same text.
 
     Raises:
@@ -174,7 +166,7 @@ def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
         raise NotBuilt(str(error)) from error
 
 
-def _built(generated: Path, signs: Sequence[Signature], layout: str) -> Library:
+def _built(generated: Path, signs: Sequence[Signature], layout: str) -> ctypes.CDLL:
     with children.scratch("executors") as folder:
         shim = folder / "layout.c"
         shim.write_text(layout, encoding="utf-8")
@@ -184,14 +176,14 @@ def _built(generated: Path, signs: Sequence[Signature], layout: str) -> Library:
         return _loaded(library)
 
 
-def _loaded(library: Path) -> Library:
+def _loaded(library: Path) -> ctypes.CDLL:
     """Load the library; it stays mapped when its folder is gone.
 
     Raises:
         NotBuilt: It calls a function that is not defined.
     """
     try:
-        return Library(ctypes.CDLL(str(library)))
+        return ctypes.CDLL(str(library))
     except OSError as error:
         called = str(error).partition("undefined symbol: ")[2] or str(error)
         refusal = NotBuilt(f"the C executors call `{called}`, which is a function of yours and not linked")
@@ -215,17 +207,17 @@ def _layout(sign: Signature) -> str:
 class CExecutor:
     """A generated C executor with a state of its own."""
 
-    def __init__(self, library: Library, sign: Signature, level: LevelSign) -> None:
+    def __init__(self, library: ctypes.CDLL, sign: Signature, level: LevelSign) -> None:
         self._library = library  # keeps the file that is mapped
         count = len(sign.leaves) + len(sign.trace)
-        places = list((ctypes.c_uint * (count + 1)).in_dll(library.handle, f"rcsc_{sign.program}_places"))
+        places = list((ctypes.c_uint * (count + 1)).in_dll(library, f"rcsc_{sign.program}_places"))
         self._memory = ctypes.create_string_buffer(places[-1])
         self._address = ctypes.byref(self._memory)
-        self._cycle = getattr(library.handle, level.cycle)
+        self._cycle = getattr(library, level.cycle)
         self._cycle.restype = ctypes.c_int32
-        self._check = getattr(library.handle, sign.check)
+        self._check = getattr(library, sign.check)
         self._check.restype = ctypes.c_int32
-        getattr(library.handle, sign.init)(self._address)
+        getattr(library, sign.init)(self._address)
         formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format_in_c]
         self._places, self._formats = places, formats
         order = sorted(range(count), key=places.__getitem__)
@@ -247,7 +239,7 @@ class CExecutor:
     def write(self, name: str, value: ctypes.Array[ctypes.c_uint64] | ctypes.c_uint32) -> None:
         """Set a variable of the library, where it has one of that name."""
         try:
-            there = type(value).in_dll(self._library.handle, name)
+            there = type(value).in_dll(self._library, name)
         except ValueError:
             return
         ctypes.memmove(ctypes.byref(there), ctypes.byref(value), ctypes.sizeof(value))

@@ -124,6 +124,15 @@ class Leaf:
         return value
 
 
+def c_range(c_type: str) -> tuple[int, int]:
+    """Return the least and the greatest value of a C type of whole numbers, or of truth."""
+    if c_type == "bool":
+        return 0, 1
+    code = FORMATS[c_type]
+    bits = 8 * struct.calcsize(f"<{code}")
+    return (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if code.islower() else (0, 2**bits - 1)
+
+
 def number_word(leaf: Leaf) -> str:
     """Return the language's word for the type of a number."""
     return {"double": "real", "float": "single"}.get(leaf.c_type, "int")

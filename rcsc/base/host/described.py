@@ -220,11 +220,16 @@ class Document:
 
     def check(self, kind: Kind) -> None:
         """Note everything in the file that is not as `kind` says."""
-        self._check(kind, self.value, ())
+        self.check_part(kind, self.value, ())
 
     def check_part(self, kind: Kind, value: object, path: KeyPath) -> None:
         """Note everything that is not as `kind` says in a value that stands at `path`."""
-        self._check(kind, value, path)
+        if not fits(kind, value):
+            what = f"`{shown_path(path)}` must be {kind.shown}" if path else f"the file must be {kind.shown}"
+            self.wrong(path, f"{what}, not {_short(value)}")
+            return
+        for key, inner, of in self._parts(kind, value, path):
+            self.check_part(of, inner, (*path, key))
 
     def holds(self, kind: Record) -> bool:
         """Return whether the keys of a record are there as it declares, whatever else is."""
@@ -243,14 +248,6 @@ class Document:
             last = Diagnostic(self.code, f"and {more} faults more", Label(faults[MOST_FAULTS].primary.span))
             faults = [*faults[:MOST_FAULTS], last]
         return error(diagnostics=faults, sources={self.name: self.source})
-
-    def _check(self, kind: Kind, value: object, path: KeyPath) -> None:
-        if not fits(kind, value):
-            what = f"`{shown_path(path)}` must be {kind.shown}" if path else f"the file must be {kind.shown}"
-            self.wrong(path, f"{what}, not {_short(value)}")
-            return
-        for key, inner, of in self._parts(kind, value, path):
-            self._check(of, inner, (*path, key))
 
     def _parts(self, kind: Kind, value: Any, path: KeyPath) -> Iterator[tuple[str | int, object, Kind]]:
         """Yield each part of a value that fits, by key or position, and the kind it must be."""

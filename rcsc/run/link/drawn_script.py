@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from random import Random
 from typing import TypeAlias
 
-from rcsc.code.emit.code_tree import type_bounds
 from rcsc.lang.restart import ECHO, NUMBER
 from rcsc.run.description import Description
-from rcsc.run.signature import REALS, Leaf, Signature, Value, Values
+from rcsc.run.signature import REALS, Leaf, Signature, Value, Values, c_range
 
 Published: TypeAlias = dict[str, Values]
 Begin: TypeAlias = tuple[str, int | None, tuple[int, Value] | None]
@@ -44,7 +43,7 @@ def edges(leaf: Leaf) -> list[Value]:
     low, high = (0.0, len(leaf.members) - 1.0) if leaf.members else (leaf.low or 0, leaf.high or 0)
     if leaf.c_type in REALS:
         return [*map(leaf.held, (low, high, (low + high) / 2, low - 0.5, high + 0.5)), math.nan]
-    least, most = type_bounds(leaf.c_type)
+    least, most = c_range(leaf.c_type)
     near = [int(end) + by for end in (low, high) for by in (-1, 0, 1)]
     return [value for value in near if least <= value <= most]
 

@@ -18,9 +18,7 @@ from typing import Any, Protocol
 from rcsc.base.host.described import nearest
 from rcsc.run.plant import fields
 from rcsc.run.plant.units import Factor, factor
-from rcsc.run.signature import REALS, Leaf, Value, number_word
-
-C_BITS = {f"{sign}int{bits}_t": (bits, sign == "") for bits in (8, 16, 32, 64) for sign in ("", "u")}
+from rcsc.run.signature import REALS, Leaf, Value, c_range, number_word
 
 
 class BadValue(ValueError):  # noqa: N818  # what happened, not an error of ours
@@ -152,7 +150,7 @@ class NumberLink:
 
     def _held(self, number: int) -> int:
         """Clamp a whole number where the variable is declared so; else check that its C type holds it."""
-        low, high = c_range(self.leaf)
+        low, high = c_range(self.leaf.c_type)
         if self.leaf.clamp and self.leaf.low is not None and self.leaf.high is not None:
             return int(min(max(number, self.leaf.low), self.leaf.high))
         if not low <= number <= high:
@@ -353,12 +351,6 @@ def _range_misfit(leaf: Leaf, of: fields.Number, *, gives: bool) -> tuple[str, t
     if not gives and (leaf.low < low or high < leaf.high):
         return f"takes {ranges}", ("widen the field's range, or narrow the variable's",)
     return None
-
-
-def c_range(leaf: Leaf) -> tuple[int, int]:
-    """Return the least and the greatest whole number of a C type."""
-    bits, signed = C_BITS[leaf.c_type]
-    return (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
 
 
 def _times(by: Factor, number: float) -> Fraction | float:
