@@ -66,11 +66,7 @@ class _Source(importlib.machinery.SourceFileLoader):
 
 
 def _module(name: str, path: Path) -> ModuleType:
-    """Import the module of a generated file.
-
-    Raises:
-        NotBuilt: It cannot be read.
-    """
+    """Import the module of a generated file. Raises NotBuilt: it cannot be read."""
     loader = _Source(name, str(path))
     module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
     try:

@@ -90,11 +90,7 @@ def _same(rig: Rig[Any], wanted: str) -> None:
 
 
 def _drawn(rig: Rig[E], seed: int, index: int) -> E:
-    """Return an episode of a campaign.
-
-    Raises:
-        NotDrawn: A plant that is asked for its faults does not come back.
-    """
+    """Return an episode of a campaign. Raises NotDrawn: a plant that is asked for its faults does not come back."""
     try:
         with within(rig.limit_s):
             return rig.episode(seed, index)

@@ -144,11 +144,7 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
 
 
 def _root(path: Path, program: str) -> str:
-    """Return the source of a program.
-
-    Raises:
-        BadDescription: It is not there.
-    """
+    """Return the source of a program. Raises BadDescription: it is not there."""
     tried = places(path, program)
     root = next((place for place in tried if place.is_file()), None)
     if root is None:
@@ -158,11 +154,7 @@ def _root(path: Path, program: str) -> str:
 
 
 def _program(path: Path, name: str) -> Program:
-    """Return a resolved program.
-
-    Raises:
-        BadDescription: Its source is not in order.
-    """
+    """Return a resolved program. Raises BadDescription: its source is not in order."""
     loaded = load([_root(path, name)])
     program = resolve(loaded.roots[0], loaded) if loaded.roots else ()
     if isinstance(program, Program):

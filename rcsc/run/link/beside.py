@@ -228,11 +228,7 @@ def _members(system: Linked) -> Iterator[tuple[str, list[tuple[str, str]]]]:
 def _built(
     system: Linked, sources: Path, folder: Path, members: Mapping[str, Sequence[tuple[str, str]]]
 ) -> ctypes.CDLL:
-    """Build the library.
-
-    Raises:
-        NotBuilt: There is no compiler, or it refused.
-    """
+    """Build the library. Raises NotBuilt: there is no compiler, or it refused."""
     struct_name = f"{system.word}_t"
     places = ", ".join(
         f"offsetof({struct_name}, {member})" for leaves in members.values() for member, _ in leaves

@@ -293,11 +293,7 @@ class _Reading:
         self.topics[channel.topic] = channel.id
 
     def log(self) -> Log:
-        """The log.
-
-        Raises:
-            KeyError, TypeError, ValueError, AttributeError, StopIteration: It is none.
-        """
+        """The log. Raises KeyError, TypeError, ValueError, AttributeError, StopIteration: it is none."""
         facts = self.metadata[SYSTEM]
         levels = tuple(self._level(spec.name) for spec in system_of(facts, _NOWHERE, _NOWHERE).levels)
         if not levels or not all(level.track.ticks for level in levels):

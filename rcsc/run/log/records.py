@@ -102,11 +102,7 @@ class _Frames:
     sealed: "hashlib._Hash | None" = None
 
     def take(self, count: int) -> bytes:
-        """The next bytes.
-
-        Raises:
-            EOFError: There are not as many.
-        """
+        """The next bytes. Raises EOFError: there are not as many."""
         taken = self.file.read(count)
         if len(taken) < count:
             raise EOFError
@@ -283,11 +279,7 @@ class _Unpacking:
 
 
 def _inside(data: bytes) -> Iterator[McapRecord | None]:
-    """The records of a chunk; None for those that do not matter here.
-
-    Raises:
-        ValueError: One is cut.
-    """
+    """The records of a chunk; None for those that do not matter here. Raises ValueError: one is cut."""
     at = 0
     while at < len(data):
         length = int.from_bytes(data[at + 1 : at + 9], "little")

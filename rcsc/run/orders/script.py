@@ -193,11 +193,7 @@ class _Reader:
                 yield f"no order has a field `{name}`, and no buffer from outside is called so{near}"
 
     def row(self, number: int, line: Mapping[str, str]) -> OrderRow:
-        """Read a row.
-
-        Raises:
-            ValueError: The row has an error.
-        """
+        """Read a row. Raises ValueError: the row has an error."""
         shown = " ".join(
             cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items()
         )
@@ -268,11 +264,7 @@ def _order(level: Served, line: Mapping[str, str]) -> tuple[Value, ...]:
 
 
 def _read(leaf: Leaf, cell: str, column: str) -> Value:
-    """Read the value of a cell.
-
-    Raises:
-        ValueError: The cell is no value of the leaf.
-    """
+    """Read the value of a cell. Raises ValueError: the cell is no value of the leaf."""
     try:
         value = leaf.read(cell)
     except ValueError:

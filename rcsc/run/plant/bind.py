@@ -118,11 +118,7 @@ class BoundPlant:
             return space
 
     def _drawn(self) -> str:
-        """Draw the plant as an SVG document.
-
-        Raises:
-            PlantFailed: `picture` raised, or gave something else.
-        """
+        """Draw the plant as an SVG document. Raises PlantFailed: `picture` raised, or gave something else."""
         with told("the plant's `picture` failed"):
             text = self.plant.picture()
             if not isinstance(text, str):

@@ -96,11 +96,7 @@ def _attributes(value: Any, where: str) -> dict[str, Any]:
 
 
 def _restored(now: Any, then: Any) -> Any:
-    """Return a kept value in the form of the present one.
-
-    Raises:
-        ValueError: It has another form.
-    """
+    """Return a kept value in the form of the present one. Raises ValueError: it has another form."""
     if isinstance(now, enum.Enum):
         return _member(type(now), then)
     if isinstance(now, tuple) and isinstance(then, list):

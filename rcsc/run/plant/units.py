@@ -73,11 +73,7 @@ def factor(unit: str, into: str) -> Factor | None:
 
 
 def _parsed(unit: str) -> tuple[Factor, dict[str, int]]:
-    """Return the size of a unit in base units, and their powers.
-
-    Raises:
-        ValueError: The text is no unit.
-    """
+    """Return the size of a unit in base units, and their powers. Raises ValueError: the text is no unit."""
     fraction, pi, powers = Fraction(1), 0, Counter[str]()
     at, text = 0, unit.strip()
     while at < len(text):

@@ -24,11 +24,7 @@ _CHUNKS = {"kinematic": 10, "mujoco": 4}
 
 
 def _drawn(seed: int, system: Path, plant: str, _script: str) -> Episode:
-    """Return the episode of a seed.
-
-    Raises:
-        BadDescription: The plant is not called as one of the cell's.
-    """
+    """Return the episode of a seed. Raises BadDescription: the plant is not called as one of the cell's."""
     for backend in get_args(Backend):
         if plant == backend:
             return draw(seed, backend, system)
@@ -47,11 +43,7 @@ def _run(episode: Episode, system: Path, log: Path | None, claims: Claims) -> Ep
 
 
 def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG001  # it runs on its own
-    """Refuse what the system has not.
-
-    Raises:
-        ValueError: A level, or a buffer.
-    """
+    """Refuse what the system has not. Raises ValueError: a level, or a buffer."""
     from rcsc.run.episodes.loop import check_names  # these load the language, as a run does
     from rcsc.run.episodes.stand import stand
 

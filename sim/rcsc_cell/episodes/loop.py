@@ -275,11 +275,7 @@ def _operator(episode: Episode, database: Database, task: Signature) -> Operator
 
 
 def _lying(database: Database, part: PartSpec) -> Lying:
-    """Return a part where the episode has it.
-
-    Raises:
-        BadData: No part or no station is called so.
-    """
+    """Return a part where the episode has it. Raises BadData: no part or no station is called so."""
     if part.object not in database.objects or part.station not in database.stations:
         raise BadData((f"no part is called `{part.object}`, or no station `{part.station}`",))
     number = database.objects[part.object]

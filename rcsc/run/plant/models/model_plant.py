@@ -159,11 +159,7 @@ def _quiet(_warning: str) -> None:
 
 
 def _model(page: Document, setup: Setup) -> Any:
-    """Load the model.
-
-    Raises:
-        BadPlant: It cannot be read.
-    """
+    """Load the model. Raises BadPlant: it cannot be read."""
     path = setup.spec.model or Path()
     try:
         return mujoco.MjModel.from_xml_path(str(path))
