@@ -212,8 +212,7 @@ class RunningLevel:
     @property
     def fault_text(self) -> str:
         """The fault of the last cycle in words, with the inputs of its table where they are known."""
-        saw = self.sign.witness(self.table, self.values)
-        return self.sign.fault_text(self.values) + (f"; it saw {saw}" if saw else "")
+        return self.sign.fault_seen(self.level, self.values)
 
     @property
     def line(self) -> str:

@@ -290,6 +290,11 @@ class Signature:
             raise KeyError(name)
         return range(places[0], places[-1] + 1)
 
+    def leaves_of(self, name: str) -> tuple[Leaf, ...]:
+        """Return a variable's leaves; raises KeyError where there is none of that name."""
+        run = self.record(name)
+        return self.leaves[run.start : run.stop]
+
     def level_of(self, name: str) -> LevelSign:
         """The level of that name.
 
@@ -382,6 +387,11 @@ class Signature:
             return ""
         seen = ((name, self.index[name]) for name in self.sees.get(table, ()) if name in self.index)
         return ", ".join(f"`{name}` = {self.leaves[at].shown(values[at])}" for name, at in seen)
+
+    def fault_seen(self, level: LevelSign, values: Values) -> str:
+        """Return a fault in words, with the inputs of its table where they are known."""
+        saw = self.witness(self.table_of(level, values), values)
+        return self.fault_text(values) + (f"; it saw {saw}" if saw else "")
 
     def _invariant(self, at: int) -> str:
         at -= len(self.leaves)

@@ -204,7 +204,7 @@ def _check_variable(
 ) -> None:
     """Note a variable that the program lacks, that is of another kind, or that is no scalar where one is wanted."""
     try:
-        leaves = [sign.leaves[at] for at in sign.record(variable)]
+        leaves = sign.leaves_of(variable)
     except KeyError:
         names = sorted({part for leaf in sign.leaves for part in (leaf.name, leaf.name.partition(".")[0])})
         page.wrong(path, f"program `{sign.program}` has no variable `{variable}`", *nearest(variable, names))
@@ -222,7 +222,7 @@ def _check_ends(page: Document, system: Description, signs: Mapping[str, Signatu
         for end in (wire.source, wire.target):
             owner, _, variable = end.partition(".")
             if owner in signs:
-                leaves = [signs[owner].leaves[at] for at in signs[owner].record(variable)]
+                leaves = signs[owner].leaves_of(variable)
                 ends.append(
                     [(leaf.name.removeprefix(variable), leaf.c_type, leaf.members) for leaf in leaves]
                 )

@@ -682,10 +682,10 @@ def test_the_summary_counts_by_fault_and_does_not_know_the_order() -> None:
     ]  # fmt: skip
     assert (found.episodes, found.cycles, found.with_findings) == (4, 40, 3)
     assert found.ends == {"crash": 1, "done": 1, "failed:part_lost": 1, "failed:timeout": 1}
-    assert [(broken.property, broken.episodes, broken.first, broken.message) for broken in found.broken] == [
+    assert [(broken.property, broken.episodes, broken.first, broken.said) for broken in found.broken] == [
         ("p", 2, 1, "said 1"), ("q", 1, 2, "said 2"), ("r", 1, 3, "said 3"),
     ]  # fmt: skip
-    assert [(reached.ran, reached.never) for reached in found.reached] == [(("1",), ("2",)), (("1",), ())]
+    assert [(reached.reached, reached.never) for reached in found.reached] == [(("1",), ("2",)), (("1",), ())]
     text = as_text(found)
     assert "\ndrops         -       2       -\n" in text
     assert "level task: 1 of 2 lines reached\n  a never: 2\nlevel emove: 1 of 1" in text

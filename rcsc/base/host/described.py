@@ -333,10 +333,10 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
     name = str(path)
     try:
         text = read.text(path, read.MOST_TOML_BYTES)
-    except OSError as problem:
-        raise _unread(name, f"the file cannot be read: {problem.strerror}", code, error) from problem
-    except read.Malformed as problem:
-        raise _unread(name, f"the file {problem}", code, error) from problem
+    except (OSError, read.Malformed) as problem:
+        why = f"cannot be read: {problem.strerror}" if isinstance(problem, OSError) else problem
+        fault = Diagnostic(code, f"the file {why}", Label(Span(name, 0, 0)))
+        raise error(diagnostics=(fault,)) from problem
     source = Source(name, text)
     try:
         return Document(name, source, read.toml_of(text), code)
@@ -344,10 +344,6 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
         at = _decode_place(str(problem), text)
         fault = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)))
         raise error(diagnostics=(fault,), sources={name: source}) from problem
-
-
-def _unread(name: str, message: str, code: Code, error: type[BadFile]) -> BadFile:
-    return error(diagnostics=(Diagnostic(code, message, Label(Span(name, 0, 0))),))
 
 
 def _decode_place(message: str, text: str) -> int:

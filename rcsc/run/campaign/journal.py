@@ -10,7 +10,7 @@ import os
 import re
 import stat
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -193,15 +193,8 @@ def _line(entry: dict[str, Any]) -> bytes:
 
 
 def _entry(record: EpisodeRecord) -> dict[str, Any]:
-    return {
-        "index": record.index,
-        "faults": record.faults,
-        "end": record.end,
-        "ticks": record.ticks,
-        "findings": [[finding.property, finding.tick, finding.message] for finding in record.findings],
-        "lines": f"{record.lines:x}",
-        "digest": record.digest,
-    }
+    findings = [list(astuple(finding)) for finding in record.findings]
+    return asdict(record) | {"findings": findings, "lines": f"{record.lines:x}"}
 
 
 @dataclass(frozen=True, slots=True)

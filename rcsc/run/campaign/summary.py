@@ -6,7 +6,7 @@ the caller adds times.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from rcsc.run.campaign.journal import EpisodeRecord
@@ -57,7 +57,7 @@ class Broken:
     property: str
     episodes: int
     first: int
-    message: str
+    said: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class LinesReached:
 
     level: str
     table: str
-    ran: tuple[str, ...]
+    reached: tuple[str, ...]
     never: tuple[str, ...]
 
 
@@ -212,19 +212,8 @@ def as_json(summed: Summary) -> dict[str, Any]:
         "episodes_with_findings": summed.with_findings,
         "outcomes_by_fault": summed.by_fault,
         "outcomes": summed.ends,
-        "findings": [
-            {
-                "property": broken.property,
-                "episodes": broken.episodes,
-                "first": broken.first,
-                "said": broken.message,
-            }
-            for broken in summed.broken
-        ],
-        "lines": [
-            {"level": table.level, "table": table.table, "reached": table.ran, "never": table.never}
-            for table in summed.reached
-        ],
+        "findings": [asdict(broken) for broken in summed.broken],
+        "lines": [asdict(table) for table in summed.reached],
     }
 
 
@@ -251,7 +240,7 @@ def _properties(properties: Iterable[Broken]) -> list[str]:
     return [
         head,
         *(
-            f"{broken.property:{longest}}  {broken.episodes:8}  {broken.first}: {broken.message}"
+            f"{broken.property:{longest}}  {broken.episodes:8}  {broken.first}: {broken.said}"
             for broken in listed
         ),
     ]
@@ -264,8 +253,8 @@ def _coverage(reached: Iterable[LinesReached]) -> list[str]:
         by_level.setdefault(table.level, []).append(table)
     for level, tables in by_level.items():
         ran, all_ = (
-            sum(len(table.ran) for table in tables),
-            sum(len(table.ran) + len(table.never) for table in tables),
+            sum(len(table.reached) for table in tables),
+            sum(len(table.reached) + len(table.never) for table in tables),
         )
         lines.append(f"level {level}: {ran} of {all_} lines reached")
         lines += [f"  {table.table} never: {_named(table.never)}" for table in tables if table.never]

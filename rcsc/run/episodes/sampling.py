@@ -145,17 +145,13 @@ def scripted(its: Stand, script: str, plant: str = "") -> tuple[OrderSpec, ...]:
     return tuple(
         OrderSpec(
             row.served.level,
-            _command(row.served, row.order),
+            str(dict(_values(row.served, row.order))[row.served.command]),
             tuple(_fields(row.served, row.order)),
             faults=row.faults,
         )
         for row in rows
         if row.served is not None
     )
-
-
-def _command(level: Served, order: Sequence[Value]) -> str:
-    return str(dict(_values(level, order))[level.command])
 
 
 def _fields(level: Served, order: Sequence[Value]) -> Iterator[FieldValue]:

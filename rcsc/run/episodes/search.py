@@ -130,13 +130,9 @@ def found_again(
 ) -> EpisodeFinding | None:
     """Return the finding of a property in an episode; None for nothing, and of an episode that is none of the system's."""
     with contextlib.suppress(ValueError):
-        return _found_again(episode, its, name, kinds)
+        if name in (AGREE, REPEATS):
+            found = disagreement(episode, its, kinds[0], kinds[-1])
+            return found if found is not None and found.property == name else None
+        outcome = Loop(episode, its).finish()
+        return next((finding for finding in outcome.findings if finding.property == name), None)
     return None
-
-
-def _found_again(episode: Episode, its: Stand, name: str, kinds: Sequence[Kind]) -> EpisodeFinding | None:
-    if name in (AGREE, REPEATS):
-        found = disagreement(episode, its, kinds[0], kinds[-1])
-        return found if found is not None and found.property == name else None
-    outcome = Loop(episode, its).finish()
-    return next((finding for finding in outcome.findings if finding.property == name), None)

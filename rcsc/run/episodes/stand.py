@@ -143,19 +143,14 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
     )  # fmt: skip
 
 
-def _root(path: Path, program: str) -> str:
-    """Return the source of a program. Raises BadDescription: it is not there."""
-    tried = places(path, program)
+def _program(path: Path, name: str) -> Program:
+    """Return a resolved program. Raises BadDescription: its source is not there, or not in order."""
+    tried = places(path, name)
     root = next((place for place in tried if place.is_file()), None)
     if root is None:
         shown = " nor ".join(f"`{place}`" for place in tried)
-        raise BadDescription(f"the source of program `{program}` is neither {shown}")
-    return str(root)
-
-
-def _program(path: Path, name: str) -> Program:
-    """Return a resolved program. Raises BadDescription: its source is not in order."""
-    loaded = load([_root(path, name)])
+        raise BadDescription(f"the source of program `{name}` is neither {shown}")
+    loaded = load([str(root)])
     program = resolve(loaded.roots[0], loaded) if loaded.roots else ()
     if isinstance(program, Program):
         return program

@@ -77,12 +77,8 @@ class Subordinate:
         return tuple(by_place.get(place, value) for place, value in enumerate(report))
 
 
-def subordinates(its: Stand, seed: int) -> tuple[Subordinate, ...]:
-    """Return everybody outside to whom a level gives numbered orders, and who reports on them."""
-    return tuple(_each(its, seed))
-
-
-def _each(its: Stand, seed: int) -> Iterator[Subordinate]:
+def subordinates(its: Stand, seed: int) -> Iterator[Subordinate]:
+    """Yield everybody outside to whom a level gives numbered orders, and who reports on them."""
     for down in its.system.wires:
         level, _, record = down.source.partition(".")
         party = down.target.partition(".")[0]
@@ -92,7 +88,7 @@ def _each(its: Stand, seed: int) -> Iterator[Subordinate]:
             owner, _, taken = back.target.partition(".")
             if owner != level or back.source.partition(".")[0] != party:
                 continue
-            given, leaves = _leaves(its, level, record), _leaves(its, level, taken)
+            given, leaves = its.signs[level].leaves_of(record), its.signs[level].leaves_of(taken)
             places, said = _places(given), _places(leaves)
             if {NUMBER, COMMAND} <= places.keys() and {ECHO, ECHOED, STATUS} <= said.keys():
                 done, failed, goes_on = _statuses(its, level, record, leaves[said[STATUS]])
@@ -101,11 +97,6 @@ def _each(its: Stand, seed: int) -> Iterator[Subordinate]:
                     down.source, back.source, places, said, tuple((leaf, edges[leaf.name]) for leaf in leaves),
                     done, failed, goes_on, Random(f"{seed} {down.source}"),  # noqa: S311  # repeatable on purpose
                 )  # fmt: skip
-
-
-def _leaves(its: Stand, level: str, record: str) -> tuple[Leaf, ...]:
-    run = its.signs[level].record(record)
-    return its.signs[level].leaves[run.start : run.stop]
 
 
 def _places(leaves: Sequence[Leaf]) -> dict[str, int]:

@@ -82,7 +82,7 @@ def script(
             level, _, variable = wire.target.partition(".")
             if wire.source.partition(".")[0] in signs or random.random() < 0.6:
                 continue
-            leaves = [signs[level].leaves[at] for at in signs[level].record(variable)]
+            leaves = signs[level].leaves_of(variable)
             before = last.get(wire.source, tuple(leaf.initial for leaf in leaves))
             publishes[wire.source] = last[wire.source] = tuple(
                 drawn(random, leaf, value, wild) for leaf, value in zip(leaves, before, strict=True)

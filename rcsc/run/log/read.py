@@ -25,7 +25,6 @@ from rcsc.run.log.schema import (
     RESTARTS,
     SIGNATURE,
     SYSTEM,
-    buffer_leaves,
     message_format,
     restart_of,
     signature_from,
@@ -282,7 +281,7 @@ class _Reading:
         elif channel.topic.startswith(BUFFERS):
             source, target = channel.topic.removeprefix(BUFFERS), channel.metadata["target"]
             wire = wire_of(source, target)
-            leaves = buffer_leaves(self.signs[target.partition(".")[0]], wire)
+            leaves = self.signs[target.partition(".")[0]].leaves_of(wire.target.partition(".")[2])
             self.tracks[channel.id] = Track(struct.Struct(message_format(leaves)))
         elif channel.topic.startswith(RESTARTS):
             begun, level = restart_of(channel.topic)

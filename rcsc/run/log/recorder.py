@@ -24,7 +24,6 @@ from rcsc.run.log.schema import (
     PROGRAMS,
     SIGNATURE,
     SYSTEM,
-    buffer_leaves,
     fingerprints,
     message_definition,
     message_format,
@@ -140,11 +139,10 @@ class Recorder:
         self._restarts: dict[tuple[str, Begun], tuple[int, struct.Struct]] = {}
         signs = {level.name: level.sign for level in system.levels}
         self._buffers = {
-            wire.source: self._buffer_channel(
-                wire.source, buffer_leaves(signs[wire.target.partition(".")[0]], wire), wire.target
-            )
+            wire.source: self._buffer_channel(wire.source, signs[taker].leaves_of(variable), wire.target)
             for wire in outside_wires(system.description)
-            if wire.target.partition(".")[0] in signs
+            for taker, _, variable in [wire.target.partition(".")]
+            if taker in signs
         }
         for level in system.levels:
             self._write_level(level, system.tick)

@@ -153,9 +153,3 @@ def outside_wires(system: Description) -> tuple[Wire, ...]:
     """The buffers that no level fills."""
     levels = {level.name for level in system.levels}
     return tuple(wire for wire in system.wires if wire.source.partition(".")[0] not in levels)
-
-
-def buffer_leaves(sign: Signature, wire: Wire) -> tuple[Leaf, ...]:
-    """The leaves that a buffer fills."""
-    run = sign.record(wire.target.partition(".")[2])
-    return sign.leaves[run.start : run.stop]

@@ -147,10 +147,9 @@ def field_of(leaf: Leaf) -> str:
 
 def _leaves(sign: Signature, variable: str) -> tuple[Leaf, ...]:
     try:
-        run = sign.record(variable)
+        return sign.leaves_of(variable)
     except KeyError:
         return ()
-    return sign.leaves[run.start : run.stop]
 
 
 def _has(leaves: Sequence[Leaf], *fields: str) -> bool:

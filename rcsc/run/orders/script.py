@@ -107,8 +107,7 @@ def outside_buffers(system: Description, signs: Mapping[str, Signature]) -> tupl
     for wire in system.wires:
         level, _, variable = wire.target.partition(".")
         if level in signs and wire.source.partition(".")[0] not in signs:
-            run = signs[level].record(variable)
-            buffers.append(OutsideBuffer(wire.source, signs[level].leaves[run.start : run.stop]))
+            buffers.append(OutsideBuffer(wire.source, signs[level].leaves_of(variable)))
     return tuple(buffers)
 
 

@@ -257,8 +257,7 @@ def buffers_of(
             party, _, name = end.partition(".")
             level, _, variable = other.partition(".")
             if party in parties and level in signs:
-                run = signs[level].record(variable)
-                leaves = signs[level].leaves[run.start : run.stop]
+                leaves = signs[level].leaves_of(variable)
                 buffers.append(
                     Buffer(wire.source, end, (party, *name.split(".")), leaves, other, gives, _path(wire))
                 )

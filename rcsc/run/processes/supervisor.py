@@ -219,9 +219,8 @@ class Supervisor:
             return f"level `{name}`: a fault"
         sign = self._signs[name]
         level = sign.level_of(name)
-        ran = sign.table_of(level, values)
-        table, saw = f", table `{ran}`" if level.stages else "", sign.witness(ran, values)
-        return f"level `{name}`{table}: {sign.fault_text(values)}" + (f"; it saw {saw}" if saw else "")
+        table = f", table `{sign.table_of(level, values)}`" if level.stages else ""
+        return f"level `{name}`{table}: {sign.fault_seen(level, values)}"
 
 
 def run_processes(

@@ -522,7 +522,8 @@ class _Rows:
         """Return the points of a departure from a location, or of an approach to it: that ends there."""
         location = self.toml["location"][name]
         key, through = (self.numbers[name], sector), location.get("trajectory", "fast")
-        points = [self._point(where, key, role, to, through) for to in self._path(place, steps, where)]
+        on_the_way = (self._through(place, step, where) for step in steps)
+        points = [self._point(where, key, role, to, through) for to in on_the_way]
         if role == "approach":
             fine = "fine" if location.get("via") or location.get("approach") else "fast"
             points.append(self._point(where, key, "arrival", place, fine))
@@ -543,11 +544,8 @@ class _Rows:
         self._within("target", (hover, grasp, view), where)
         return *key, *ways, hover, grasp, view
 
-    def _path(self, place: Location, steps: Sequence[Any], where: At) -> list[Location]:
-        """Return the locations on the way; each step is a height, an offset or another location."""
-        return [self._through(place, step, where) for step in steps]
-
     def _through(self, place: Location, step: str | float | list[float], where: At) -> Location:
+        """Return a location on the way to a place: a height over it, an offset, or another location."""
         if isinstance(step, str):
             other = self.toml["location"].get(step)
             if other is None:

@@ -34,8 +34,7 @@ def limits_of(system: Description, signs: Mapping[str, Signature]) -> dict[str, 
     limits: dict[str, list[list[Limit | None]]] = {}
     for spec in system.levels:
         for feed in spec.feeds:
-            run = signs[spec.name].record(feed.into)
-            leaves = [signs[spec.name].leaves[at] for at in run]
+            leaves = signs[spec.name].leaves_of(feed.into)
             limits.setdefault(feed.query, []).append([_limit(spec.name, leaf) for leaf in leaves])
     return limits
 
@@ -68,8 +67,8 @@ def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
             page.wrong(("buffers",), f"the cell needs buffer `{source}`, with `{inner}` at the level's end")
         else:
             sign = signs[level]
-            leaves = [sign.leaves[at].name for at in sign.record(record)]
-            if [name.removeprefix(f"{record}.") for name in leaves] != list(fields):
+            leaves = sign.leaves_of(record)
+            if [leaf.name.removeprefix(f"{record}.") for leaf in leaves] != list(fields):
                 page.wrong(("buffers", source), f"the cell needs in `{inner}`: {', '.join(fields)}")
     if not page.faults:
         _need_words(page, signs)

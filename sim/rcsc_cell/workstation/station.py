@@ -301,8 +301,7 @@ def workstation(
     Raises:
         BadScript: A row names an unknown place or part.
     """
-    order = tuple(task.leaves[at] for at in task.record("workstation"))
-    report = tuple(task.leaves[at] for at in task.record("to_workstation"))
+    order, report = task.leaves_of("workstation"), task.leaves_of("to_workstation")
     parts = next(leaf.members for leaf in order if _last(leaf) == "obj")
     wrong = [
         f"row {row.number}: no location is called `{name}`"

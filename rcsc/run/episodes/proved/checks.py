@@ -367,10 +367,6 @@ def _answer_stays(_: Claim, reader: Reader, level: ProvedLevel, *, failed: bool)
     return check
 
 
-def _contract(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
-    return contract(claim.name, reader, level)
-
-
 def _again(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     """A line that gave an order and matches again on the same inputs changes nothing, and gives no other."""
     if reader.asks:
@@ -414,7 +410,7 @@ _MAKERS: Mapping[str, Callable[[Claim, Reader, ProvedLevel], Check]] = {
     "ONCE": _once,
     "DEFERRED": _deferred,
     "ANSWERED": _answered,
-    "CONTRACT": _contract,
+    "CONTRACT": lambda claim, reader, level: contract(claim.name, reader, level),
     "GIVEN": _given,
     "STANDS": _stands,
     "DONE_STAYS": partial(_answer_stays, failed=False),
