@@ -167,12 +167,8 @@ class LevelSign:
     @property
     def every_table(self) -> tuple[str, ...]:
         """Every table that it may run, in the order of a cycle."""
-        return tuple(name for stage in self.stages for name in stage.kept) + self.last_tables
-
-    @property
-    def last_tables(self) -> tuple[str, ...]:
-        """Every table that it may run last."""
-        return (self.table,) if self.table else tuple(dict.fromkeys(self.tables.values()))
+        before = (name for stage in self.stages for name in stage.kept)
+        return (*before, *((self.table,) if self.table else dict.fromkeys(self.tables.values())))
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,13 +240,8 @@ class Signature:
         return (*TRACE, *self.failed)
 
     @property
-    def trace_format(self) -> str:
-        """The format of the trace's members for `struct`, in a log."""
-        return "i" * len(TRACE) + "Q" * len(self.failed)
-
-    @property
     def trace_format_in_c(self) -> str:
-        """The same in C's struct, where few assumptions take a smaller word."""
+        """The format of the trace's members for `struct`, in C, where few assumptions take a smaller word than in a log."""
         return "i" * len(TRACE) + ("I" if len(self.monitored) <= FEW_MONITORED else "Q") * len(self.failed)
 
     def failures(self, values: Values) -> tuple[str, ...]:
@@ -261,7 +252,8 @@ class Signature:
     @property
     def packed(self) -> struct.Struct:
         """Leaves and trace as canonical bytes."""
-        return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + self.trace_format)
+        leaves = "".join(FORMATS[leaf.c_type] for leaf in self.leaves)
+        return struct.Struct("<" + leaves + "i" * len(TRACE) + "Q" * len(self.failed))
 
     def form(self, run: range) -> str:
         """Return the format in which `struct.pack` refuses values of other types; a bool is packed as a number."""

@@ -41,11 +41,6 @@ class LevelSeen:
     level: LevelSign
     values: Values
 
-    @property
-    def lines(self) -> tuple[tuple[str, str], ...]:
-        """Table and line of each that the cycle ran."""
-        return self.sign.lines_of(self.level, self.values)
-
 
 @dataclass(slots=True)
 class Unsets:
@@ -121,7 +116,10 @@ class Unsets:
 
     def _set_by(self, level: LevelSeen, left: frozenset[int]) -> set[int]:
         """Return which of those that are left the cycle may have set."""
-        begun, ran = level.sign.begun(level.values), dict.fromkeys(level.lines)
+        begun, ran = (
+            level.sign.begun(level.values),
+            dict.fromkeys(level.sign.lines_of(level.level, level.values)),
+        )
         written = {
             level.sign.index[name]
             for group in level.sign.unset

@@ -14,7 +14,6 @@ from rcsc.lang.protocol.environment import EARLY, ENVIRONMENT, Event, Kept, refu
 from rcsc.lang.restart import NUMBERED, After, Fixed, SameAs
 from rcsc.proof.symbolic import values
 from rcsc.run.episodes.episode import FAULTS
-from rcsc.run.episodes.sampling import MADE
 from rcsc.run.signature import FAULTS as FAULT_NAMES
 from tests.support.programs.stages import program_of
 
@@ -64,8 +63,10 @@ def test_the_manual_has_the_same_table() -> None:
 
 def test_episodes_make_what_they_are_said_to_make() -> None:
     """What the tables' own procedures and assumptions do comes by itself; a process alone goes on from a checkpoint."""
-    assert set(MADE) <= set(FAULTS)
-    assert set(MADE.values()) == {Event.INPUT_REFUSED, Event.BEGUN_ANEW}
+    made = {"refused": Event.INPUT_REFUSED, "restarted": Event.BEGUN_ANEW}
+    assert set(made) <= set(FAULTS)
+    by_itself = {Event.RUNS, Event.EXTERN_REFUSED, Event.ASSUMPTION_FAILS, Event.RESUMED}
+    assert set(Event) - set(made.values()) == by_itself
 
 
 OUTSIDE = {Event.RUNS: (5, 6), Event.INPUT_REFUSED: (10, 6), Event.EXTERN_REFUSED: (5, 10)}

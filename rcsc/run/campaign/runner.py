@@ -9,7 +9,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from rcsc.run.campaign.journal import EpisodeRecord, Journal
@@ -52,14 +51,6 @@ def campaign(
             future.cancel()
 
 
-@dataclass(frozen=True, slots=True)
-class _Flight:
-    """A chunk under way, and with whom."""
-
-    chunk: Chunk
-    executor: Executor
-
-
 class _Round:
     """Chunks that wait, that are suspected, and that fly."""
 
@@ -70,7 +61,7 @@ class _Round:
         self._suspects: deque[Chunk] = deque()
         self._alone = False
         self._since_s = 0.0
-        self.flying: dict[Future[Records], _Flight] = {}
+        self.flying: dict[Future[Records], tuple[Chunk, Executor]] = {}  # chunks under way, and with whom
 
     @property
     def busy(self) -> bool:
@@ -96,20 +87,20 @@ class _Round:
 
     def _fly(self, chunk: Chunk) -> None:
         future = self._pool.submit(play, self._rig, self._digest, self._seed, chunk)
-        self.flying[future] = _Flight(chunk, self._pool.executor)
+        self.flying[future] = chunk, self._pool.executor
 
     def _taken(self, future: Future[Records]) -> Records:
-        flight = self.flying.pop(future)
+        chunk, executor = self.flying.pop(future)
         try:
             return future.result()
         except self._pool.deaths as death:
-            self._pool.survive(death, flight.executor)
+            self._pool.survive(death, executor)
         if not self._alone:
-            self._suspects.append(flight.chunk)
-        elif len(flight.chunk) > 1:
-            self._suspects.extendleft((index,) for index in reversed(flight.chunk))
+            self._suspects.append(chunk)
+        elif len(chunk) > 1:
+            self._suspects.extendleft((index,) for index in reversed(chunk))
         else:
-            return (self._guilty(flight.chunk[0]),)
+            return (self._guilty(chunk[0]),)
         return ()
 
     def _guilty(self, index: int) -> EpisodeRecord:

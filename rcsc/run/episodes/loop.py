@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeAlias
 
 from rcsc.base.host.files.names import shown
 from rcsc.run.episodes.cycle import MOST_MESSAGE, Broken, Cycle
@@ -34,6 +35,8 @@ from rcsc.run.system import Outside, System, check_answered, executors
 
 COOL_TICKS = 30
 """Watched after the last order has ended."""
+Around: TypeAlias = tuple[Staged, EpisodeOperator]
+"""What stands around the levels of an episode: all that is outside, and who gives the orders."""
 RAISES = "the plant raises nothing"
 RESTARTS = "starts anew"
 
@@ -55,14 +58,6 @@ def run(
         OSError: The log cannot be written.
     """
     return Loop(episode, stand(Path(system)), claims).finish(log)
-
-
-@dataclass(frozen=True, slots=True)
-class Around:
-    """What stands around the levels of an episode: all that is outside, and who gives the orders."""
-
-    stage: Staged
-    operator: EpisodeOperator
 
 
 def held(its: Stand, readings: tuple[Reading, ...]) -> Iterator[tuple[Field, Held]]:
@@ -115,9 +110,9 @@ def _checked(
 ) -> tuple[Around, list[tuple[Field, Held]]]:
     if around is None:
         stage = staged(StageOrder(str(its.path), episode.plant, seed=episode.seed), its.system, its.signs)
-        around = Around(stage, operator(its.served, episode.orders))
+        around = stage, operator(its.served, episode.orders)
     check_names(episode, its)
-    known = faults_of(around.stage.outside)
+    known = faults_of(around[0].outside)
     switched = (one.fault for one in episode.switches)
     for name in (*switched, *(fault for order in episode.orders for fault in order.faults)):
         if name not in known:
@@ -180,7 +175,7 @@ class Loop:
     ) -> None:
         self.episode, self._its = episode, its
         around, fields = _checked(episode, its, around)
-        self._stage, self.operator = around.stage, around.operator
+        self._stage, self.operator = around
         refuse_unproved(its.system)
         check_answered(its.system, self._stage.queries)
         first: dict[str, tuple[Value, ...]] = {

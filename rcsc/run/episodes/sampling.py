@@ -11,7 +11,6 @@ from pathlib import Path
 from random import Random
 
 from rcsc.base.diagnostics.coded import CodedError
-from rcsc.lang.protocol.environment import Event
 from rcsc.run.episodes.episode import (
     FAULTS,
     BufferFault,
@@ -51,8 +50,6 @@ UNORDERED = (50, 200, 1000)
 
 HARMS: tuple[Harm, ...] = ("lost", "lost", "late", "late", "doubled", "stale")
 """As often as each is drawn."""
-MADE = {"refused": Event.INPUT_REFUSED, "restarted": Event.BEGUN_ANEW}
-"""Faults that are events of a level; the others are what its buffers and its environment bring."""
 
 Add = Callable[[Random, Stand, Episode], Episode]
 

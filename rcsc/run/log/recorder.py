@@ -171,7 +171,14 @@ class Recorder:
             OSError: The disk is full, or cannot be written; says up to which cycle the log is kept.
         """
         with self._reporting():
-            self._write_tick(system, ran)
+            self._tick = system.tick
+            for restart in system.restarts:
+                self._write_restart(system.level(restart.level), restart, system.tick)
+            for level in ran:
+                self._write_level(level, system.tick)
+            self._write_buffers(system)
+            if system.tick % self._ticks_a_chunk == 0:
+                self._end_chunk()
 
     @contextlib.contextmanager
     def _reporting(self) -> Iterator[None]:
@@ -183,16 +190,6 @@ class Recorder:
                 self._file.close()
             why = f"{error.strerror}; the log is kept up to cycle {self._kept}"
             raise OSError(error.errno, why, str(self._path)) from error
-
-    def _write_tick(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
-        self._tick = system.tick
-        for restart in system.restarts:
-            self._write_restart(system.level(restart.level), restart, system.tick)
-        for level in ran:
-            self._write_level(level, system.tick)
-        self._write_buffers(system)
-        if system.tick % self._ticks_a_chunk == 0:
-            self._end_chunk()
 
     def _end_chunk(self) -> None:
         """Write what there is, and the chain over it."""

@@ -260,22 +260,6 @@ class Replay:
         told = None if self.log.finding is None else self.log.finding.cycles.get((tick, level))
         return () if told is None else told.answers
 
-    def forward(self) -> ReplayMoment:
-        """The next tick.
-
-        Raises:
-            IndexError: This was the last.
-        """
-        return self.go(self.tick + 1)
-
-    def back(self) -> ReplayMoment:
-        """The tick before.
-
-        Raises:
-            IndexError: This was the first.
-        """
-        return self.go(self.tick - 1)
-
     def moments(self) -> Iterator[ReplayMoment]:
         """Every tick from the first."""
         return (self.go(tick) for tick in self.log.ticks)

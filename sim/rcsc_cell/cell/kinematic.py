@@ -8,7 +8,7 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, hypot
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,22 +61,18 @@ class Kinematic:
     """
 
     def __init__(self, database: Database, bodies: Sequence[Body], start: Joints, seed: int = 0) -> None:
-        self.database, self.bodies, self.start, self.seed = database, tuple(bodies), start, seed
+        self.database, self.bodies = database, tuple(bodies)
         self._vise = next((station for station in database.stations.values() if station.vise), None)
         self._space: MechanismSpace | None = None
-        self.reset()
-
-    def reset(self) -> None:
-        """Reset everything."""
         self.faults = Faults()
-        self._joints = self.start
+        self._joints = start
         self._poses = [Pose(body.turn, body.at_mm) for body in self.bodies]
         self._opening_mm, self._force_n = EMPTY_MM, 0.0
         self._jaws_mm = (JAWS_MM, JAWS_MM)
         self._held: int | None = None
         self._in_hand = Pose(UPRIGHT, (0.0, 0.0, 0.0))
         self._touching: frozenset[tuple[str, str]] = frozenset()
-        self._rng = np.random.default_rng(self.seed)
+        self._rng = np.random.default_rng(seed)
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Kinematic":
         """Copy it; the copy goes on by itself with the same database."""
@@ -112,7 +108,7 @@ class Kinematic:
         """Return the scene: the model that physics would move, with everything where it is now."""
         from rcsc_cell.cell.space import MechanismSpace  # MuJoCo is loaded only where somebody looks
 
-        if self._space is None or self._space.mechanism is not self:
+        if self._space is None:
             self._space = MechanismSpace(self, self.database, self.bodies)
         return self._space
 
@@ -120,15 +116,11 @@ class Kinematic:
 
     def state(self) -> dict[str, Any]:
         """Return all that the next cycle depends on but faults, in plain values."""
-        return cast(
-            dict[str, Any],
-            plain(
-                _State(
-                    self._joints, self._poses, self._opening_mm, self._force_n, self._jaws_mm, self._held,
-                    self._in_hand, noise_of(self._rng),
-                )
-            ),
-        )  # fmt: skip
+        state: dict[str, Any] = plain(_State(
+            self._joints, self._poses, self._opening_mm, self._force_n, self._jaws_mm, self._held,
+            self._in_hand, noise_of(self._rng),
+        ))  # fmt: skip
+        return state
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back a state of the same cell.
@@ -155,20 +147,16 @@ class Kinematic:
         if not self.faults.vise_stuck:
             self._clamp(jaws_mm)
         held = self._held
-        self._touching = (
-            frozenset()
-            if held is None
-            else frozenset({("pad_left", f"part{held}"), ("pad_right", f"part{held}")})
-        )
+        pads = () if held is None else ("pad_left", "pad_right")
+        self._touching = frozenset((pad, f"part{held}") for pad in pads)
 
     def _move(self, goal: Joints) -> None:
         was, self._joints = self._joints, self.faults.reachable(self._joints, goal)
         self._pads = plate(self._joints) @ Pose(UPRIGHT, (0.0, 0.0, self.database.hand.tool_mm))
         if self._held is not None:
             if self.faults.slips and self._joints != was:
-                self._opening_mm = max(
-                    0.0, self._opening_mm - 1000 * self._force_n / GAIN_N_M
-                )  # as far as the motor springs
+                # as far as the motor springs
+                self._opening_mm = max(0.0, self._opening_mm - 1000 * self._force_n / GAIN_N_M)
                 self._let_go()
             else:
                 self._poses[self._held] = self._pads @ self._in_hand

@@ -25,7 +25,10 @@ DENSITY_KG_M3 = 2700.0
 BASELINE_MM = 150.0
 """From the camera to the light projector on the hand's other side."""
 FOVY_DEG = 45.0
+STEP_S = 0.002
+"""One step of physics. 2 ms is measured to be enough; at 8 ms the vise no longer takes a part."""
 PAD_FRICTION = 0.9
+"""Of the fingers' pads, whatever they touch."""
 OPEN_MM = 130.0
 """The hand's widest opening."""
 GAIN_N_M = 20_000.0
@@ -59,34 +62,18 @@ class Body:
         return pose.at_mm[2] - sum(abs(pose.axis(at)[2]) * self.size_mm[at] / 2 for at in range(3))
 
 
-@dataclass(frozen=True, slots=True)
-class Make:
-    """The settings with which a cell's model is made.
-
-    Attributes:
-        step_s: One step of physics. 2 ms is measured to be enough; at 8 ms the vise no longer takes a part.
-        pad_friction: Of the fingers' pads, whatever they touch.
-    """
-
-    step_s: float = 0.002
-    pad_friction: float = PAD_FRICTION
-
-
-USUAL = Make()
-
-
-def mjcf(database: Database, parts: Sequence[Body], make: Make = USUAL) -> str:
+def mjcf(database: Database, parts: Sequence[Body], step_s: float = STEP_S) -> str:
     """Write the cell's model.
 
     Args:
         database: Stations, fixtures, the hand's measures.
         parts: What lies about.
-        make: Step and friction.
+        step_s: One step of physics.
     """
     stations = "\n".join(map(_station, database.stations.values()))
     lying = "\n".join(starmap(_part, enumerate(parts)))
     return f"""<mujoco model="cell">
-{_head(make)}
+{_head(step_s)}
 <worldbody>
 <light pos="0.2 -0.2 2.6" dir="0 0 -1" diffuse=".6 .6 .6"/>
 <light pos="1.6 1.2 2.4" dir="-1 -.8 -1.6" diffuse=".45 .45 .45"/>
@@ -99,11 +86,11 @@ def mjcf(database: Database, parts: Sequence[Body], make: Make = USUAL) -> str:
 </mujoco>"""
 
 
-def _head(make: Make) -> str:
+def _head(step_s: float) -> str:
     # The pads' time constant is two steps, the least that MuJoCo takes: friction creeps less the stiffer a contact is, and a part
     # in the hand must not wander while the arm sweeps round. Their priority makes their friction the one that counts.
     return f"""<compiler angle="degree" autolimits="true"/>
-<option timestep="{make.step_s}" integrator="implicitfast" cone="elliptic" impratio="10" jacobian="dense"/>
+<option timestep="{step_s}" integrator="implicitfast" cone="elliptic" impratio="10" jacobian="dense"/>
 <size memory="4M"/>
 <visual><map znear="0.02" zfar="20"/></visual>
 <asset>
@@ -119,7 +106,7 @@ def _head(make: Make) -> str:
 <default class="fixed"><geom contype="1" conaffinity="0" friction="0.5 0.003 0.0001" condim="4" material="steel"/></default>
 <default class="hand"><geom contype="4" conaffinity="3" condim="3" group="2" material="dark"/></default>
 <default class="pad"><geom contype="4" conaffinity="3" condim="6" priority="1" group="2" material="pad"
- friction="{make.pad_friction} 0.01 0.0005" solref="{2 * make.step_s} 1" solimp="0.95 0.99 0.0005"/></default>
+ friction="{PAD_FRICTION} 0.01 0.0005" solref="{2 * step_s} 1" solimp="0.95 0.99 0.0005"/></default>
 <default class="part"><geom contype="2" conaffinity="3" condim="4" group="1" material="part"/></default>
 </default>"""
 

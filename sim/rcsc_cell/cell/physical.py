@@ -16,7 +16,7 @@ from rcsc.base.host.files.plain import finite, plain, read
 from rcsc.run.plant.models.space import ModelSpace
 from rcsc_cell.cell.arm import Joints
 from rcsc_cell.cell.faults import Faults
-from rcsc_cell.cell.mujoco_model import GAIN_N_M, USUAL, Body, Make, mjcf
+from rcsc_cell.cell.mujoco_model import GAIN_N_M, STEP_S, Body, mjcf
 from rcsc_cell.cell.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, Rotation, Vector
@@ -51,7 +51,7 @@ class Physical:
         bodies: The parts.
         start: The joints at first, in radians.
         seed: Of the sensor's noise.
-        make: Step and friction.
+        step_s: One step of physics.
     """
 
     def __init__(
@@ -60,31 +60,24 @@ class Physical:
         bodies: Sequence[Body],
         start: Joints,
         seed: int = 0,
-        make: Make = USUAL,
+        step_s: float = STEP_S,
     ) -> None:
-        self.database, self.bodies, self.start, self.seed = database, tuple(bodies), start, seed
-        self.model = mujoco.MjModel.from_xml_string(mjcf(database, bodies, make))
+        self.database, self.bodies = database, tuple(bodies)
+        self.model = mujoco.MjModel.from_xml_string(mjcf(database, bodies, step_s))
         self.data = mujoco.MjData(self.model)
         self.faults = Faults()
         self._cameras: dict[Optics, Camera] = {}
-        self._steps = round(CYCLE_S / make.step_s)
-        self._friction = self.model.geom_friction.copy()
+        self._steps = round(CYCLE_S / step_s)
         self._pads = [self.model.geom(f"pad_{side}").id for side in ("left", "right")]
+        self._friction = float(self.model.geom_friction[self._pads[0], 0])
         self._fingers = [self.model.joint(f"finger_{side}").qposadr[0] for side in ("left", "right")]
         self._jaws = [self.model.joint(f"jaw_{side}").qposadr[0] for side in ("right", "left")]
         self._felt = [self.model.sensor(f"pad_{side}").adr[0] for side in ("left", "right")]
         self._motor = self.model.sensor("hand").adr[0]
         self._named = [self.model.geom(at).name or "look" for at in range(self.model.ngeom)]
-        self.reset()
-
-    def reset(self) -> None:
-        """Reset everything, with all that faults changed in the model."""
-        self.faults = Faults()
-        self.model.geom_friction[:] = self._friction
-        mujoco.mj_resetData(self.model, self.data)
-        self._goal, self._setpoint_m = self.start, EMPTY_MM / 1000
-        self._rng = np.random.default_rng(self.seed)
-        self.data.qpos[:6] = self.start
+        self._goal, self._setpoint_m = start, EMPTY_MM / 1000
+        self._rng = np.random.default_rng(seed)
+        self.data.qpos[:6] = start
         self.data.qpos[self._fingers] = EMPTY_MM / 2000
         self.data.qpos[self._jaws] = JAWS_MM / 1000
         self._jaw_goal = (JAWS_MM, JAWS_MM)
@@ -184,9 +177,8 @@ class Physical:
             ctrl[0:12:2] = a + share * (b - a)
             ctrl[12] = first + share * (self._setpoint_m - first)
             mujoco.mj_step(self.model, self.data)
-        mujoco.mj_forward(
-            self.model, self.data
-        )  # what is read belongs to the end of the cycle, not to the step before it
+        # what is read belongs to the end of the cycle, not to the step before it
+        mujoco.mj_forward(self.model, self.data)
 
     def _squeezed(self, grip: Grip) -> float:
         """Return the fingers' set point, in m: toward the opening at the speed, and no farther from where they are than the force.
@@ -205,8 +197,7 @@ class Physical:
         return max(width_m - give_m, min(width_m + give_m, after))
 
     def _apply_faults(self) -> None:
-        wanted = SLIPPERY if self.faults.slips else float(self._friction[self._pads[0], 0])
-        self.model.geom_friction[self._pads, 0] = wanted
+        self.model.geom_friction[self._pads, 0] = SLIPPERY if self.faults.slips else self._friction
 
     # --- camera ---
 

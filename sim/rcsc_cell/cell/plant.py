@@ -101,10 +101,6 @@ class Mechanism(Protocol):
 
     faults: Faults
 
-    def reset(self) -> None:
-        """Reset everything, with all that faults changed."""
-        ...
-
     def joints(self) -> Joints:
         """Return the joints as they are, in radians."""
         ...
@@ -192,9 +188,11 @@ class Plant:
         self._command(latest("primitive.to_robot"))
         right, left = self.mechanism.jaws()
         to_right, to_left, vise = self.vise.step(latest(VISE_ORDER), right, left)
+        if self.faults.vise_weak:  # it closes no farther than that, and is not pushed out by it
+            to_right = max(to_right, min(right, WEAK_MM))
         machine = self.machine.step(latest(MACHINE_ORDER), right, left)
         grip = self._grasp(latest("gripper.to_hand"))
-        self.mechanism.advance(self.robot.joints, grip, (self._pressed(right, to_right), to_left))
+        self.mechanism.advance(self.robot.joints, grip, (to_right, to_left))
         self._look(tick, latest("vision.to_camera"))
         opening_mm, force_n = self.mechanism.hand()
         fixture = {} if self.faults.vise_mute else {VISE_REPORT: vise, MACHINE_REPORT: machine}
@@ -255,12 +253,6 @@ class Plant:
             drive, opening, force, speed = order
             self._grip = Grip(bool(drive), float(opening), float(force), float(speed))
         return DROP if self.faults.drops else self._grip
-
-    # --- vise ---
-
-    def _pressed(self, right_mm: float, wanted_mm: float) -> float:
-        """Return the place where the right jaw is sent: a weak one closes no farther than `WEAK_MM`, and is not pushed out by that."""
-        return max(wanted_mm, min(right_mm, WEAK_MM)) if self.faults.vise_weak else wanted_mm
 
     # --- camera ---
 

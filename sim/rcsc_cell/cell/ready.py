@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rcsc_cell.cell.kinematic import Kinematic
-from rcsc_cell.cell.mujoco_model import USUAL, Body, Make
+from rcsc_cell.cell.mujoco_model import STEP_S, Body
 from rcsc_cell.cell.plant import Mechanism, Plant
 from rcsc_cell.cell.reach import home
 from rcsc_cell.cell.robot import Robot
@@ -38,7 +38,7 @@ def plant(
     backend: Backend = "mujoco",
     parts: Sequence[Lying] | None = None,
     seed: int = 0,
-    make: Make = USUAL,
+    step_s: float = STEP_S,
 ) -> Plant:
     """Make a plant whose robot is at home.
 
@@ -47,7 +47,7 @@ def plant(
         backend: Physics, or kinematics alone.
         parts: What lies about; the database's parts by default.
         seed: Of the sensor's noise.
-        make: Step and friction of physics.
+        step_s: One step of physics.
 
     Raises:
         BadData: The robot cannot be at its home.
@@ -61,7 +61,7 @@ def plant(
     if backend == "mujoco":
         from rcsc_cell.cell.physical import Physical  # MuJoCo is loaded only where it is asked for
 
-        mechanism = Physical(database, bodies, start, seed, make)
+        mechanism = Physical(database, bodies, start, seed, step_s)
     else:
         mechanism = Kinematic(database, bodies, start, seed)
     return Plant(database, mechanism, Robot(start), tuple(part.object for part in here))

@@ -128,7 +128,7 @@ class Database:
         if (
             known
             and here == location
-            and self._same_sector(here, here_sector, sector)
+            and (here_sector == sector or not self._is_pallet(here))
             and not self.place(here)[1]
         ):
             first, count = comes
@@ -143,9 +143,6 @@ class Database:
 
     def _is_pallet(self, location: int) -> bool:
         return (location, 1) in self._routes
-
-    def _same_sector(self, location: int, one: int, other: int) -> bool:
-        return one == other or not self._is_pallet(location)
 
     def part(self, number: int) -> Values:
         """Return a part: known, ranges in mm from the camera to its top, as it lies and when the pads can take it; lift in mm; normal.

@@ -21,7 +21,7 @@ from rcsc.run.orders.script import BadScript
 from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Signature, Values
 from rcsc_cell.cell.kinematic import Kinematic
-from rcsc_cell.cell.mujoco_model import Body, Make
+from rcsc_cell.cell.mujoco_model import Body
 from rcsc_cell.cell.ready import Lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import BadData
@@ -75,8 +75,8 @@ class Loop(loop.Loop):
             self.orders = _operator(episode, self.database, its.signs["task"])
         self.in_cell = episode
         lying = [_lying(self.database, part) for part in episode.parts]
-        self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
-        around = loop.Around(Staged((self.plant,), self.database.queries), self.orders)
+        self.plant = plant(self.database, episode.backend, lying, episode.seed, episode.step_s)
+        around = Staged((self.plant,), self.database.queries), self.orders
         super().__init__(episode.in_any_system(), its, claims, around)
         self._end = refused
         seen = self.cycle
@@ -175,7 +175,8 @@ class Loop(loop.Loop):
             line.given, line.ended = Given(command.number, spec, state.tick, command.name == "pause"), None
         if state.command is not None and not self._taken:
             self._take(state.command)
-        if line.given is not None and line.ended is None and state.number_answered:
+        echo = state.value("task", "to_workstation.inc_command_echo")
+        if line.given is not None and line.ended is None and line.given.number == echo:
             status = state.shown("task", "to_workstation.status_report")
             if status != "executing":
                 line.ended, state.ended = state.tick, status

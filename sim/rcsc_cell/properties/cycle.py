@@ -105,14 +105,6 @@ class CycleState(Cycle):
         return any(name in self.last and self.last[name] >= since_tick for name in names)
 
     @property
-    def number_answered(self) -> bool:
-        """Whether TASK's answer is about the command under way."""
-        return (
-            self.command is not None
-            and self.value("task", "to_workstation.inc_command_echo") == self.command.number
-        )
-
-    @property
     def counts(self) -> dict[str, int]:
         """Return what TASK counts on the buffer, by object."""
         return {name: int(self.value("task", leaf)) for name, leaf in COUNTED.items()}

@@ -82,11 +82,8 @@ class RightReason:
         reason = cycle.shown("task", "to_workstation.failure")
         if wrong and reason != "cmd" and not self._explained(cycle, command, reason):
             return f"`{command.name}` is not legal ({wrong}), and failed with `{reason}`"
-        return (
-            None
-            if wrong or self._explained(cycle, command, reason)
-            else f"`{command.name}` failed with `{reason}`"
-        )
+        explained = bool(wrong) or self._explained(cycle, command, reason)
+        return None if explained else f"`{command.name}` failed with `{reason}`"
 
     def _explained(self, cycle: CycleState, command: Command, reason: str) -> bool:
         if reason == "buf":
@@ -94,12 +91,8 @@ class RightReason:
         if reason == "nothing_gripped":
             # what was in the hand is lost, whatever took it; or a level below has forgotten how far apart the fingers are
             return not cycle.held or self._restarted
-        if reason == "move" and command.name == "release" and not command.end_at and not command.here:
-            return (
-                True  # it was changed in mid-motion: there is no location whose safe position it could go to
-            )
         if reason == "move" and not command.here:
-            return True  # it was stopped on its way: from there no straight line may lead where it is to go
+            return True  # stopped on its way: no straight line may lead from there, and no place has a safe position
         since = command.tick if not self._restarted else 0
         named = (name for name, at in cycle.last.items() if at >= since or name == "restarted")
         if any(reason in REASONS[name] for name in named):
@@ -129,10 +122,8 @@ class RightReason:
             return True
         [index] = here
         body = cycle.bodies[index]
-        slides = (body.density_kg_m3, body.friction) != (
-            DENSITY_KG_M3,
-            FRICTION,
-        )  # a finger that meets it first may push it aside
+        # a finger that meets it first may push it aside
+        slides = (body.density_kg_m3, body.friction) != (DENSITY_KG_M3, FRICTION)
         sizes = zip(body.size_mm, database.sizes[database.objects[command.obj]], strict=True)
         crowded = slides or any(
             dist(at[index], other) < ROOM_MM for which, other in enumerate(at) if which != index

@@ -113,12 +113,8 @@ class DoneTrue:
     def _hand(self, cycle: CycleState, command: Command) -> str | None:
         """Whether what TASK believes to hold is in the fingers."""
         believed = cycle.shown("task", "obj_now_in_gripper")
-        if self._excused:
-            return None
-        if (
-            believed == "unknown_object"
-        ):  # of which nothing is known; jammed fingers may have nothing between them
-            return None
+        if self._excused or believed == "unknown_object":
+            return None  # of that nothing is known; jammed fingers may have nothing between them
         if believed == "null_obj":
             unknown = cycle.held and self._forgot is None
             return f"the hand holds part {cycle.held[0]}, and TASK knows of none" if unknown else None
@@ -177,9 +173,8 @@ class CountsTrue:
                 and self._begun.number == cycle.command.number
             )
             closing = cycle.tick - self._forgot < CLOSING_TICKS  # fingers may still take a part
-            believed = (
-                cycle.shown("task", "obj_now_in_gripper") != "null_obj"
-            )  # a part that a changed PICKUP has counted
+            # a part that a changed PICKUP has counted
+            believed = cycle.shown("task", "obj_now_in_gripper") != "null_obj"
             still = same or closing or believed or bool(cycle.held)
             picking = self.changed_pickup and _under_way(cycle, "pickup")
             letting_go = self.changed_release and _under_way(cycle, "release")

@@ -57,14 +57,12 @@ class FoundPart:
         y_mm: The part's middle, above the camera's axis, at the expected range.
         roll_rad: Of the long side from camera x, in (-pi/2, pi/2]; a square top has none, and this then means nothing.
         range_mm: From its area, if the surface faces the camera.
-        score: How far its features are from the wanted ones: relative differences of area, length and width added; 0 is best.
     """
 
     x_mm: float
     y_mm: float
     roll_rad: float
     range_mm: float
-    score: float
 
 
 def find(
@@ -119,10 +117,10 @@ def choose(shapes: Iterable[Patch], wanted: Features, expected_range_mm: float) 
     alike = [(hypot(shape.x_mm, shape.y_mm), score, shape) for score, shape in rated if score <= limit]
     if not alike:
         return None
-    _, score, best = min(alike, key=lambda rating: rating[:2])
+    *_, best = min(alike, key=lambda rating: rating[:2])
     size_mm2 = wanted.length_mm * wanted.width_mm
     range_mm = expected_range_mm * sqrt(size_mm2 / best.area_mm2)
-    return FoundPart(best.x_mm, best.y_mm, best.roll_rad, range_mm, score)
+    return FoundPart(best.x_mm, best.y_mm, best.roll_rad, range_mm)
 
 
 def mismatch(seen: Patch, wanted: Features) -> float:

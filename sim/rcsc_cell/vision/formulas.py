@@ -93,9 +93,8 @@ def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Op
     long, short = max(top.length_mm, top.width_mm) * scale, min(top.length_mm, top.width_mm) * scale
     roll = top.roll_rad if top.length_mm >= top.width_mm else top.roll_rad + pi / 2
     c, s = cos(roll), sin(roll)
-    lost_along = INWARD_PX * _share(
-        top.x_mm * c + top.y_mm * s
-    )  # with the sign of the side away from the axis
+    # with the sign of the side away from the axis
+    lost_along = INWARD_PX * _share(top.x_mm * c + top.y_mm * s)
     lost_across = INWARD_PX * _share(top.y_mm * c - top.x_mm * s)
     along = lost_along / 2 + error[0] * edge_px * sqrt(long / 6 + short / 2) / short
     across = lost_across / 2 + error[1] * edge_px * sqrt(short / 6 + long / 2) / long
@@ -144,9 +143,8 @@ def perceive_surface(top: Top, rng: np.random.Generator, optics: Optics = STANDA
     plane = np.array([range_mm, nx / nz, ny / nz]) + np.linalg.cholesky(covariance) @ normals
     steep = optics.baseline_mm / optics.middle_mm
     plane[0] += range_mm**2 / optics.baseline_mm * (1 + steep**2) * aim
-    free = (
-        len(x) - 3
-    )  # a mean square of so many has a relative deviation of sqrt(2 / free), its root of half that
+    # a mean square of so many has a relative deviation of sqrt(2 / free), its root of half that
+    free = len(x) - 3
     return surface(plane, row_mm * sqrt(free / len(x)) * max(0.0, 1 + spread / sqrt(2 * free)), len(x))
 
 

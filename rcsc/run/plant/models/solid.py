@@ -334,9 +334,8 @@ def _scene(shapes: Sequence[Solid], places: Sequence[tuple[Floats, Floats]]) -> 
 def _polygons(scene: _Scene, colours: Floats, camera: _Camera) -> Iterator[str]:
     shown, flat = _shown(scene, camera)
     boxes = np.concatenate((flat.min(axis=1), flat.max(axis=1)), axis=1)
-    light = (
-        AMBIENT + (1 - AMBIENT) * (0.5 + 0.5 * scene.normals @ LIGHT) ** 1.5
-    )  # faces in the shade differ, too
+    # faces in the shade differ, too
+    light = AMBIENT + (1 - AMBIENT) * (0.5 + 0.5 * scene.normals @ LIGHT) ** 1.5
     shades = np.clip(colours[scene.solid] * light[:, None] * 255, 0, 255).astype(int)
     where = {int(face): at for at, face in enumerate(shown)}
     for face in _painted(scene, camera.eye, boxes, shown):
