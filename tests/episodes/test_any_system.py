@@ -20,8 +20,7 @@ from rcsc.run.episodes.episode import (
     Restart,
     Switch,
 )
-from rcsc.run.episodes.explain import Explanations
-from rcsc.run.episodes.harm import HarmedMemory, Held
+from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.loop import Loop, check, run
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.episodes.sampling import draw, fault_classes, fault_names

@@ -27,8 +27,8 @@ The same seed draws the same episode; the same episode has the same outcome, wit
 the plant, and the reference interpreter for what a property means. An episode proves nothing: that is `rcsc prove`. It costs some 0.1 ms a
 cycle and level.
 
-Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `harm` (buffers in which something
-goes wrong), `operator` (who orders), `subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what
-was proved), `properties`, `explain` (whose fault it is), `loop` (runs one), `sampling` (draws one), `search` (looks for one that breaks a
-property, with Hypothesis).
+Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `operator` (who orders),
+`subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what was proved), `properties`, `harm`
+(buffers in which something goes wrong, and whose fault it is), `loop` (runs one), `sampling` (draws one), `search` (looks for one that
+breaks a property, with Hypothesis).
 """

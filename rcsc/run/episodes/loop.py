@@ -12,8 +12,7 @@ from typing import TypeAlias
 from rcsc.base.host.files.names import shown
 from rcsc.run.episodes.cycle import MOST_MESSAGE, Broken, Cycle
 from rcsc.run.episodes.episode import Episode, Reading
-from rcsc.run.episodes.explain import Explanations
-from rcsc.run.episodes.harm import HarmedMemory, Held
+from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
 from rcsc.run.episodes.properties import ENDS, NO_ERROR, properties, was_refused

@@ -11,6 +11,6 @@ cycle in which `late` runs breaks it, and is a finding `LEVEL: proved: ...` like
 A claim says nothing of a run in which something was broken that it takes for granted; nor does a level that was given older values
 again. What no episode can look at is told, with why. It costs some 0.2 ms a cycle and level.
 
-Modules, in the order the data flows: `claims` (values), `cycles` (what a claim sees), `checks` (a cycle), `endings` (commands that go
-round), `watch` (with what is taken for granted).
+Modules, in the order the data flows: `claims` (values), `cycles` (what a claim sees), `checks` (a cycle), `watch` (with what is
+taken for granted, and commands that go round).
 """
