@@ -6,7 +6,7 @@ from typing import ClassVar
 from rcsc_cell.cell.arm import plate
 from rcsc_cell.database.ask import Database, Station
 from rcsc_cell.properties.cycle import COUNTED, LETS_GO, TAKES, Command, CycleState
-from rcsc_cell.workstation.rest import PUTS
+from rcsc_cell.workstation.interlocks import PUTS
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""

@@ -23,6 +23,6 @@ bounds and held against the system's own signature.
 
 Nothing here is trusted for a proof: TASK is proved for any command at any moment.
 
-Modules, in the order the data flows: `script` (rows), `orders` (numbers and buffers), `interlocks`, `rest` (what is
-left of a row), `station` (the workstation as it runs), `prepared` (a system that fits, and its database).
+Modules, in the order the data flows: `script` (rows), `orders` (numbers and buffers), `interlocks` (and what is left
+of a row), `station` (the workstation as it runs), `prepared` (a system that fits, and its database).
 """

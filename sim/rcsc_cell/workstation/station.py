@@ -12,7 +12,7 @@ from rcsc.run.orders.numbered import Latest, Orders
 from rcsc.run.orders.operator import RowResult
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Leaf, Signature, Value, Values
-from rcsc_cell.workstation.interlocks import CellState, after, refusal
+from rcsc_cell.workstation.interlocks import NOTHING, CellState, Progress, after, refusal, rest, stands
 from rcsc_cell.workstation.orders import (
     CLOSED_MM,
     DONE,
@@ -23,7 +23,6 @@ from rcsc_cell.workstation.orders import (
     VISE_REPORT,
     ajar,
 )
-from rcsc_cell.workstation.rest import NOTHING, Progress, rest, stands
 from rcsc_cell.workstation.script import MACHINE, ROBOT, ScriptRow
 
 ANSWER_TICKS = 75
