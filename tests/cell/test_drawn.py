@@ -34,10 +34,9 @@ from rcsc_cell.cell.arm import skeleton, solve
 from rcsc_cell.cell.reach import home
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import nine, pose_of
+from rcsc_cell.pictures.room import ALONE, NAMED, TOP, Block, Mark
 from rcsc_cell.pictures.scene import DrawnCell, cell
 from rcsc_cell.pictures.stick import Scene, pads, stick
-from rcsc_cell.pictures.things import NAMED, Block, Mark
-from rcsc_cell.pictures.views import ALONE, TOP
 from rcsc_cell.workstation.prepared import database_of
 from tests.compose.test_findings import LAST_ECHO, PUBLISHED, REPO
 from tests.support.browser import Browser

@@ -19,10 +19,9 @@ from rcsc.run.plant.models.solid import OVERVIEW, View, solid
 from rcsc.views.pages.report import CellPicture, Figure, Matched, Placement, ReportRow, Story, page, report
 from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
 from rcsc_cell.database.pose import nine
+from rcsc_cell.pictures.room import FRONT, HIGH_MM, LOW_MM, SCALE, SIDE, TOP, Outline
+from rcsc_cell.pictures.room import View as FlatView
 from rcsc_cell.pictures.stick import Scene, pads, stick
-from rcsc_cell.pictures.things import Outline
-from rcsc_cell.pictures.views import FRONT, HIGH_MM, LOW_MM, SCALE, SIDE, TOP
-from rcsc_cell.pictures.views import View as FlatView
 from tests.support.browser import Browser
 
 ABOVE = View((0.35, -0.001, 2.9), (0.35, 0.0, 0.3))

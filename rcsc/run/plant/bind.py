@@ -477,20 +477,16 @@ def _prepare(page: Document, plant: Any, buffer: Buffer, to_field: Link) -> None
     """
     try:
         first = to_field.taken(iter(leaf.initial for leaf in buffer.leaves))
-        _put_first(plant, buffer, first)
+        owner = plant
+        for part in buffer.field[:-1]:
+            owner = _own(owner, part)
+        if hasattr(owner, buffer.field[-1]):
+            _own(owner, buffer.field[-1])
+        else:
+            setattr(owner, buffer.field[-1], first)
     except (Exception, SystemExit) as error:  # noqa: BLE001  # of the user's classes
         helps = "a class of fields is made of them, by name: all others need a default"
         page.wrong(buffer.path, f"`{'.'.join(buffer.field)}` cannot be made: {raised(error)}", helps)
-
-
-def _put_first(plant: Any, buffer: Buffer, first: object) -> None:
-    owner = plant
-    for part in buffer.field[:-1]:
-        owner = _own(owner, part)
-    if not hasattr(owner, buffer.field[-1]):
-        setattr(owner, buffer.field[-1], first)
-    else:
-        _own(owner, buffer.field[-1])
 
 
 def _own(owner: Any, name: str) -> Any:

@@ -19,8 +19,8 @@ from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
+from rcsc_cell.pictures.room import outline
 from rcsc_cell.pictures.stick import Scene, pads, stick
-from rcsc_cell.pictures.things import outline
 from rcsc_cell.workstation.interlocks import PUTS
 from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import Workstation

@@ -13,6 +13,6 @@ drawn by `rcsc.run.plant.models.solid`.
 
 Nothing here is trusted for a proof. What it costs: time by the faces that are drawn.
 
-Modules, in the order the data flows: `stick` draws the stick figure (`views`, `things`); `scene` finds in a log where everything is;
+Modules, in the order the data flows: `stick` draws the stick figure (in a `room`); `scene` finds in a log where everything is;
 `data` is what the system names for its data: it makes and shows the database, and has a log drawn.
 """

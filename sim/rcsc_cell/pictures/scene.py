@@ -18,9 +18,8 @@ from rcsc_cell.cell.ready import lying
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import BadData
 from rcsc_cell.database.pose import Pose, Vector, pose_of
+from rcsc_cell.pictures.room import ALONE, PICTURES, Mark, block, outline
 from rcsc_cell.pictures.stick import Scene, pads, stick
-from rcsc_cell.pictures.things import Mark, block, outline
-from rcsc_cell.pictures.views import ALONE, PICTURES
 
 PLATE, OPENING = ".plate", ".opening_mm"
 """How the names end of nine numbers of the wrist plate, and of how far the fingers are apart."""

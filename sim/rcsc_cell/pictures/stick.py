@@ -15,8 +15,25 @@ from math import isfinite
 
 from rcsc_cell.cell.arm import Joints, skeleton
 from rcsc_cell.database.pose import Pose, Vector, pose_of
-from rcsc_cell.pictures.things import Block, Mark, Outline, ground, lying, name, pointed_at, standing
-from rcsc_cell.pictures.views import GAP_PX, PICTURES, TOP, Perspective, View, line, page_px, scale, text
+from rcsc_cell.pictures.room import (
+    GAP_PX,
+    PICTURES,
+    TOP,
+    Block,
+    Mark,
+    Outline,
+    Perspective,
+    View,
+    ground,
+    line,
+    lying,
+    name,
+    page_px,
+    pointed_at,
+    scale,
+    standing,
+    text,
+)
 
 TOOL_MM = 165.0
 PALM_MM = 70.0
