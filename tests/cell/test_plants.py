@@ -15,8 +15,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.desk.shell.opening import Opening, opened
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.run.faults import switch
 from rcsc.run.signature import Values
 from rcsc_cell.cell.arm import LIMITS, _arms, _wrist, margins_deg, plate, skeleton, solve

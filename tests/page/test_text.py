@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.desk.shell.opening import Opening
-from rcsc.desk.shell.reload.refusal import Refused
 from tests.studio.driven import Seat, dock, seated
 from tests.studio.tabled import Bench
 

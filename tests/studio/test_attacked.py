@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.source import Source
 from rcsc.base.host.files.read import Malformed
 from rcsc.base.host.trust import Agreement
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import MOST_OPEN, MOST_UNREAD, Client, Hub
 from rcsc.desk.studio.tables import desk
 from rcsc.desk.studio.tables.document import MOST_BYTES, MOST_KEPT, Document

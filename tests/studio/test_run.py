@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsc.base.diagnostics.coded import Refused as Refusal
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import Commands
 from rcsc.desk.shell.opening import Opening, opened
-from rcsc.desk.shell.reload.refusal import Refused as Refusal
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import Live
 from rcsc.desk.studio.runs.shown import moment

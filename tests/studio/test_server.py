@@ -15,9 +15,9 @@ from urllib.parse import urlsplit
 import aiohttp
 import pytest
 
+from rcsc.base.diagnostics.coded import Refused as Refusal
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.guard import MOST_CONNECTIONS, door
-from rcsc.desk.shell.reload.refusal import Refused as Refusal
 from rcsc.desk.studio.hub import MOST_OPEN, Ask, Client, Concern, Hub, message
 from rcsc.desk.studio.server import MOST_BYTES, MOST_PAGES, Server, page_files
 from rcsc.front.commands import run as rcsc

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.read import Malformed
 from rcsc.desk.editor.places import Lines, difference
 from rcsc.desk.shell.opening import Opening
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.tables import cells
 from rcsc.desk.studio.tables.document import MOST_BYTES
 from rcsc.driver.check import check

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.desk.shell.commands import Commands
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.reload.reload import Origin
 from rcsc.desk.shell.session import Session, silent_queries
 from rcsc.run.description import description

@@ -20,6 +20,18 @@ class CodedError(Exception):
         return str(self)
 
 
+class Refused(CodedError):  # noqa: N818  # what happened, not an error of ours
+    """Something that was asked for, and is not done; says why."""
+
+    def __init__(self, code: Code, message: str, *helps: str) -> None:
+        super().__init__(message)
+        self.code, self.helps = code, helps
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Come whole out of another process."""
+        return Refused, (self.code, str(self), *self.helps)
+
+
 USERS_FAILURES = (Exception, SystemExit, GeneratorExit)
 """Exceptions of the user's code that end a cycle, and not rcsc; an interrupt is the user's own."""
 

@@ -7,8 +7,8 @@ whatever their case.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.typed_names import one_leaf, shown, split
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import BadCondition, Column, Predicate, condition, named_columns

@@ -11,6 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.described import nearest
 from rcsc.desk.shell import history, typed_names
@@ -18,7 +19,6 @@ from rcsc.desk.shell.part_runs import run_part
 from rcsc.desk.shell.queries import StateQuery, question
 from rcsc.desk.shell.reload.composed import held_by, together
 from rcsc.desk.shell.reload.gate import Judged, Running, judge
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.reload.reload import Origin, Reloaded, program_of, reload
 from rcsc.desk.shell.stops import Stops, reached, stands
 from rcsc.desk.shell.typed_names import NamedLine

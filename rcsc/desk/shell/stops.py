@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.desk.shell.queries import StateQuery, asked, question
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.typed_names import NamedLine, level_of, line_of, unknown
 from rcsc.run.levels import RunningLevel
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.commands import Commands
-from rcsc.desk.shell.reload.refusal import Refused
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession

@@ -7,8 +7,8 @@ import difflib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import known_name, normal
 from rcsc.run.signature import Leaf, Signature, Value, number_word

@@ -12,7 +12,7 @@ from concurrent.futures import TimeoutError as NotYet
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.coded import CodedError, Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.jsonform import report_to_json
 from rcsc.base.host.cache import open_cache
@@ -20,7 +20,6 @@ from rcsc.base.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.base.host.children import run as run_program
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.reload.composed import prove_levels
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import LATER, TOLD_S, Ask, CancelledError, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.live import LANE as RUN
 from rcsc.desk.studio.runs.live import Live

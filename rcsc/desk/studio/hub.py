@@ -27,7 +27,6 @@ from rcsc.base.diagnostics.coded import CodedError
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.children import WorkerEndedError
 from rcsc.base.host.files.read import CheckedFields, Malformed
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.proof.solvers.smt import until
 
 Json: TypeAlias = Any
@@ -147,7 +146,7 @@ Handler: TypeAlias = Callable[[Ask], Json]
 """Answers a question, or returns `LATER`.
 
 Raises:
-    CodedError, Refused, Malformed: It is refused, with the reason.
+    CodedError, Malformed: It is refused, with the reason.
     CancelledError: Nobody waits for the answer.
 """
 
@@ -463,8 +462,8 @@ def _answered(number: int, ask: Ask, how: Callable[[], Json]) -> str | None:
 def _reason(error: BaseException) -> tuple[Code, str, Sequence[str]]:
     """Return an exception's code, message and helps: a refusal in its own words; a bug is printed, too."""
     match error:
-        case CodedError() | Refused():
-            return error.code, getattr(error, "shown", str(error)), error.helps
+        case CodedError():
+            return error.code, error.shown, error.helps
         case Malformed():
             return Code.STUDIO, str(error), ()
         case WorkerEndedError():

@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import LANE

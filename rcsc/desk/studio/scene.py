@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import Session
 from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.live import LANE
@@ -151,7 +151,7 @@ class Scene(Concern):
         """Draw a tick of the run that everybody looks at: `svg`, and `caption`, a sentence each.
 
         Raises:
-            CodedError, Refused: It cannot be drawn, with the reason.
+            CodedError: It cannot be drawn, with the reason.
         """
         history = self._time.history()
         if self._drawer is None:

@@ -13,14 +13,13 @@ prove.
 Tables that `rcsc prove` found not to be proved with their neighbours stay out; where nobody looked, it says so. A
 state has to fit leaf by leaf: a leaf that is new begins at its initial value, one that is gone is told.
 
->>> from rcsc.base.diagnostics.codes import Code
->>> from rcsc.desk.shell.reload.refusal import Refused
->>> issubclass(Refused, Exception)
+>>> from rcsc.base.diagnostics.coded import CodedError, Refused
+>>> issubclass(Refused, CodedError)
 True
 
 Trusted: as for `rcsc check`, and `diff`. What it costs: a proof of the level, and one comparison.
 
 Modules, in the order the data flows: `sources` keeps what the running tables say, `reload` proves and compiles new
 ones, `gate` decides whether the level may take them where it stands, `composed` says what is known of them with their
-neighbours; a `refusal` is why a command was not done.
+neighbours.
 """

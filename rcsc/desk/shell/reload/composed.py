@@ -7,11 +7,11 @@ are what is proved: nothing is claimed while a level runs other tables than its 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.report import named
 from rcsc.base.host.cache import Cache, open_cache
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.reload.reload import Origin, source_of
 from rcsc.desk.shell.reload.sources import KeptSources, kept
 from rcsc.driver.outline import known

@@ -11,9 +11,9 @@ they may have effects.
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.render import plain
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.hidden import hidden
 from rcsc.lang.interpret import (
     Fault,

@@ -10,6 +10,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Severity
 from rcsc.base.diagnostics.render import with_witness
@@ -17,7 +18,6 @@ from rcsc.base.diagnostics.report import Report
 from rcsc.base.host.children import scratch
 from rcsc.code.emit import TARGETS
 from rcsc.desk.shell.reload.gate import witness
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.reload.sources import KeptSources, kept, laid_out
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings

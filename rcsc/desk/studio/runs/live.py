@@ -12,11 +12,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
-from rcsc.base.diagnostics.coded import CodedError
+from rcsc.base.diagnostics.coded import CodedError, Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import Commands, Output, RunOrder
 from rcsc.desk.shell.opening import Opening, opened
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.session import Session
 from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.history import History

@@ -9,8 +9,8 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.kept import KeptFinding, finding_in, glance
 from rcsc.run.log.read import Log, UnreadableLog, read

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.kept import KeptFinding

@@ -7,8 +7,8 @@ again by the reference interpreter, up to the table that is asked for, so that a
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.interpret import (
     UNDEFINED,
     ExternError,

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from rcsc.base.diagnostics.coded import CodedError
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.lines import Lines
 from rcsc.desk.studio.runs.shown import Shown
@@ -139,11 +138,11 @@ def _pictured(whole: Film, at: int, draw: Draw) -> Iterator[None]:
     for tick in ticks:
         try:
             drawing = draw(tick)
-        except (CodedError, Refused) as error:
-            whole["why"] = whole["why"] or getattr(error, "shown", str(error))
+        except CodedError as error:
+            whole["why"] = whole["why"] or error.shown
             if (
                 tick == at
-            ):  # a plant's own picture is of now alone; what cannot be drawn at all is not tried again
+            ):  # what cannot be drawn at all is not tried again; a plant's own picture is of now alone
                 return
             continue
         room -= len(drawing["svg"])

@@ -8,9 +8,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.editor.workspace import Workspace
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.tables import cells
 from rcsc.lang.model import Program, Table, Value, spell
 from rcsc.lang.project import load

@@ -8,9 +8,9 @@ a text that parses is laid out as `rcsc fmt` does it.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.syntax.rows import Cell, Cells, stub_of
 from rcsc.lang.written.changes import Splice, formatted, new_line, over, row_text, spliced
 from rcsc.lang.written.tables import (

@@ -13,13 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.cache import FOLDER
 from rcsc.base.host.files.read import Malformed, beginning
 from rcsc.desk.editor.memo import OutdatedError
 from rcsc.desk.editor.values import Answer, Repair
 from rcsc.desk.editor.workspace import Checked, Workspace
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import PROVER
 from rcsc.desk.studio.tables.document import Document
 from rcsc.desk.studio.tables.shown import Json, TextFindings, document

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
 from rcsc.base.host.files.read import MIB, Malformed, content
 from rcsc.base.host.files.write import write_atomically
 from rcsc.desk.editor.places import Edit, Lines
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.lang.written.changes import formatted
 
 MOST_BYTES = 2 * MIB

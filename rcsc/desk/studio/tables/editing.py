@@ -6,11 +6,11 @@ that the page has seen, so that nobody changes what he has not seen.
 
 from collections.abc import Callable, Mapping, Sequence
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.read import CheckedFields
 from rcsc.desk.editor import keys
 from rcsc.desk.editor.places import Area, Edit, Lines, Place, Units
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables import cells
 from rcsc.desk.studio.tables.desk import Desk

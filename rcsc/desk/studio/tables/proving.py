@@ -7,11 +7,11 @@ All of it in the lane `proof`, which also looks at texts.
 import os
 from collections.abc import Mapping
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.desk.editor.lenses import run_at
 from rcsc.desk.editor.values import Repair
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables import shown
 from rcsc.desk.studio.tables.arrows import arrow_drawn

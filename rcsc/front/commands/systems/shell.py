@@ -8,12 +8,10 @@ from typing import Literal
 
 import click
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.host.files.read import Malformed, lines_of, standard_input, text, typed
-from rcsc.desk.shell.commands import Commands
 from rcsc.desk.shell.opening import Opening, opened
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.shell.terminal import converse, follow, listen
-from rcsc.front.commands.shared.stopped import Stopped
 from rcsc.front.commands.shared.systems import COMPILES, EXECUTOR, PLANT, made, system_path
 from rcsc.run.orders.script import BadScript
 
@@ -68,19 +66,7 @@ def command(
             commands, _lines(written), "-" if script is None else str(script), click.echo, _complain
         )
     finally:
-        _end_log(commands)
-
-
-def _end_log(commands: Commands) -> None:
-    """End the log that is being written, if any.
-
-    Raises:
-        Stopped: Its end could not be written.
-    """
-    try:
         commands.session.end_log()
-    except Refused as refused:
-        raise Stopped(refused.code, str(refused)) from refused
 
 
 def _has_prompt() -> bool:
