@@ -13,9 +13,9 @@ import pytest
 
 from rcsc.base.host.files.names import BadName
 from rcsc.base.host.files.read import CheckedFields, Malformed, json_of
-from rcsc.desk.studio.runs.gaps import Gaps
+from rcsc.desk.studio.runs.history import Gaps
+from rcsc.desk.studio.share.film import with_ticks
 from rcsc.front.commands import run
-from rcsc.front.commands.shared.played import with_ticks
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.executors import PythonExecutor

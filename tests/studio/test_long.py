@@ -10,7 +10,7 @@ import pytest
 
 from rcsc.desk.shell.opening import Opening
 from rcsc.desk.studio import plots
-from rcsc.desk.studio.runs.lines import MOST_RECORDS
+from rcsc.desk.studio.runs.shown import MOST_RECORDS
 from rcsc.front.commands import run as rcsc
 from rcsc.run.log.export import csv_text
 from rcsc.run.log.read import Log, read

@@ -20,7 +20,7 @@ from rcsc.desk.shell.opening import Opening, opened
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import Live
 from rcsc.desk.studio.runs.shown import moment
-from rcsc.desk.studio.runs.why import why
+from rcsc.desk.studio.runs.timeline import why
 from rcsc.front.commands import run as rcsc
 from rcsc.lang.interpret import initial
 from rcsc.proof.solvers.smt import Answer, Solver, Term

@@ -1,19 +1,23 @@
 """Logs that pages may open: those of the system's folder and of the one that the studio was started in.
 
 In: questions of kind `log.*`. Out: which logs there are, and one of them as the run that everybody looks at. A page names a log of that
-list, and nothing else is read. Reading has a lane of its own, for it takes seconds.
+list, and nothing else is read. Reading has a lane of its own, for it takes seconds. With a log goes what it is kept for: the finding that
+a proof wrote into it, or that a campaign put beside it, as `finding.json` in the folder of its `log.mcap`.
 """
 
 import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.files.read import json_of, text
 from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
-from rcsc.desk.studio.runs.kept import KeptFinding, finding_in, glance
-from rcsc.run.log.read import Log, UnreadableLog, read
+from rcsc.run.log.finding import LoggedFinding
+from rcsc.run.log.read import Log, UnreadableLog, finding_at_the_head, read
 
 LANE = "log"
 MOST_LOGS = 200
@@ -21,6 +25,70 @@ DEEPEST = 5
 MOST_LOOKED_AT = 20_000
 """Files and folders that are looked at for logs."""
 _ASIDE = {".git", ".venv", "venv", "node_modules", "__pycache__"}
+LOG, BESIDE = "log.mcap", "finding.json"
+MOST_CHARACTERS = 2_000
+"""Of a finding, as a page shows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptFinding:
+    """A finding about a run: the obligation or property that it breaks.
+
+    Attributes:
+        level: Whose obligation it is; empty where it is the whole system's.
+        table: What it is about; empty for the whole level.
+        text: The obligation, or the property and what was seen of it.
+        tick: In which it is broken.
+        wrong: Tick, level and what went wrong there.
+    """
+
+    level: str
+    table: str
+    text: str
+    tick: int
+    wrong: tuple[tuple[int, str, str], ...] = ()
+
+    def shown(self) -> Json:
+        """Return the finding in the form for pages."""
+        wrong = [{"tick": tick, "level": level, "text": told} for tick, level, told in self.wrong]
+        return {
+            "level": self.level, "table": self.table, "text": self.text[:MOST_CHARACTERS], "tick": self.tick, "wrong": wrong,
+        }  # fmt: skip
+
+
+def finding_in(path: Path, log: Log) -> KeptFinding | None:
+    """Return the finding for which a log is kept; None for none, or where it is of no tick of the log."""
+    found = _proved(log.finding) if log.finding is not None else _beside(path)
+    return found if found is not None and log.first <= found.tick <= log.last else None
+
+
+def glance(path: Path) -> str:
+    """Return the text of a log's finding, from its beginning alone; empty where it has none."""
+    try:
+        proved = finding_at_the_head(path)
+    except UnreadableLog:
+        return ""
+    found = _beside(path) if proved is None else _proved(proved)
+    return "" if found is None else found.text[:MOST_CHARACTERS]
+
+
+def _proved(finding: LoggedFinding) -> KeptFinding:
+    wrong = tuple((tick, level, told.wrong) for (tick, level), told in finding.cycles.items() if told.wrong)
+    return KeptFinding(finding.level, finding.table, finding.obligation, finding.broken_at, wrong)
+
+
+def _beside(path: Path) -> KeptFinding | None:
+    """Return the finding of a campaign; None where there is none, or no file that a campaign wrote."""
+    if path.name != LOG:
+        return None
+    try:
+        facts: Any = json_of(text(path.with_name(BESIDE)))
+        name, said, tick = (facts[key] for key in ("property", "said", "tick"))
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    if not (isinstance(name, str) and isinstance(said, str) and type(tick) is int):
+        return None
+    return KeptFinding("", "", f"`{name}` does not hold: {said}", tick)
 
 
 class Logs(Concern):

@@ -6,13 +6,15 @@ than a tick of it takes.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rcsc.base.diagnostics.coded import CodedError
 from rcsc.desk.studio.runs.history import History
-from rcsc.desk.studio.runs.lines import Lines
-from rcsc.desk.studio.runs.shown import Shown
+from rcsc.desk.studio.runs.shown import Lines, Shown
+from rcsc.desk.studio.share.document import played
 from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.views.pages.report import Story
 
 MOST_PICTURES = 41
 MOST_PICTURE_BYTES = 12 * 1024 * 1024
@@ -150,3 +152,19 @@ def _pictured(whole: Film, at: int, draw: Draw) -> Iterator[None]:
             return
         whole["pictures"].append({"tick": tick, **drawing})
         yield
+
+
+def with_ticks(story: Story, log: Log, drawn: Sequence[str]) -> Story:
+    """Return a story with its run tick by tick.
+
+    Args:
+        story: Its pictures of the cell are shown at their ticks.
+        log: The run.
+        drawn: Variables that have a curve at first.
+    """
+    pictures = [
+        {"tick": frame.tick, "of": f"frame-{at}", "caption": [frame.caption]}
+        for at, frame in enumerate(story.frames, 1)
+    ]
+    film = whole_run(log, drawn, pictures)
+    return replace(story, played=played(film), left_out=film["first"] - log.first)

@@ -13,5 +13,5 @@ A cell is what was typed, or nothing is changed: after each change the table is 
 repairs and standings is the editor's answer (`rcsc.desk.editor`), which is that of `rcsc check`. Trusted: nothing here for a verdict.
 
 Modules, in the order the data flows: `document`, `cells`; `shown` is what pages get; `desk` has the open files and looks at them;
-`editing` and `proving` answer pages, `writing` helps who writes the text, `arrows` makes a line of an arrow.
+`editing` and `proving` answer pages, `writing` helps who writes the text.
 """

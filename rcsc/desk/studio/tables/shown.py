@@ -11,8 +11,7 @@ from typing import Any
 from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.names.about import share_text
 from rcsc.desk.editor.places import Area, Lines, Units
-from rcsc.desk.editor.standing import BEING_PROVED
-from rcsc.desk.editor.values import Answer, Finding, Grid, GridRow, Repair, Witness
+from rcsc.desk.editor.values import BEING_PROVED, Answer, Finding, Grid, GridRow, Repair, Witness
 from rcsc.desk.studio.tables.document import Document
 from rcsc.lang.interpret import evaluate, holds
 from rcsc.lang.model import Program, Snapshot, Table, spell, value_of_text

@@ -15,7 +15,7 @@ from rcsc.desk.editor.names.find import Names
 from rcsc.desk.editor.names.index import Occurrence, Space
 from rcsc.desk.editor.names.tokens import TYPES, tokens
 from rcsc.desk.editor.places import Lines, Place, Units
-from rcsc.desk.editor.standing import BEING_PROVED
+from rcsc.desk.editor.values import BEING_PROVED
 from rcsc.desk.editor.workspace import Workspace
 from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
 from rcsc.desk.studio.tables.desk import Desk

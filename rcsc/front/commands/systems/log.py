@@ -12,7 +12,6 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files import write_atomically
 from rcsc.front.commands.shared.cells import cell_of
 from rcsc.front.commands.shared.logs import FILE, SHOWN, refuse, told
-from rcsc.front.commands.shared.played import with_ticks
 from rcsc.front.commands.shared.show import writing
 from rcsc.front.commands.shared.stopped import stopped
 from rcsc.front.commands.shared.systems import NoSystem, system_path
@@ -133,6 +132,8 @@ def _report(path: Path, log: Log, system: Path | None) -> None:
     if finding is not None:
         _written(path, lambda: trace(path, log, finding, cell, why_not))
         return
+    from rcsc.desk.studio.share.film import with_ticks  # few make a page
+
     story = with_ticks(story_of(log, cell, why_not), log, drawn_first(log, _displays(log, system)))
     _written(path, lambda: run_page(path, story))
 

@@ -17,7 +17,6 @@ from rcsc.base.host.files.read import content, json_of
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
-from rcsc.front.commands.shared.played import with_ticks
 from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped
 from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
 from rcsc.front.commands.systems.studio import serve
@@ -365,6 +364,7 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
 
 
 def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions, seconds: float) -> None:
+    from rcsc.desk.studio.share.film import with_ticks
     from rcsc.run.log.read import read  # of an extra, which the recorder had
     from rcsc.views.pages.log_page import drawn_first, matched
 
