@@ -8,8 +8,7 @@ import pytest
 from rcsc.base.diagnostics.report import TableReport, Verdict
 from rcsc.desk.editor import Workspace
 from rcsc.desk.editor.memo import OutdatedError
-from rcsc.desk.editor.standing import standing
-from rcsc.desk.editor.values import Answer, State
+from rcsc.desk.editor.values import Answer, State, standing
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.written.tables import cells_of, tables_of

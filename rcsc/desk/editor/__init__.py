@@ -20,9 +20,9 @@ Only what changed is proved again: an editor asks after each key. Verdicts are k
 lines typed above it, comments and other tables cost nothing. Trusted: what `rcsc check` trusts, and that equal values of
 `rcsc.lang.model` mean the same.
 
-Modules, in the order the data flows: `places` (lines and columns), `values` (what is answered), `memo`, `recovery`,
-`standing` (four states in words, told by one function), `grid` (a table as data), `workspace`, `keys` (what keys
-do in tables), `lenses` (what actions do); then the rooms `names` and `server`.
+Modules, in the order the data flows: `places` (lines and columns), `values` (what is answered, with the four states of a table),
+`memo`, `recovery`, `grid` (a table as data), `workspace`, `keys` (what keys do in tables), `lenses` (what actions do); then the rooms
+`names` and `server`.
 """
 
 from rcsc.desk.editor.workspace import Workspace

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.desk.editor.places import Lines
-from rcsc.desk.editor.standing import standing
+from rcsc.desk.editor.values import standing
 from rcsc.desk.editor.workspace import Checked, Reading, Workspace
 from rcsc.driver.proofs import table_report
 from rcsc.lang.interpret import (

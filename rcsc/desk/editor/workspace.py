@@ -23,8 +23,17 @@ from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.memo import Memo, OutdatedError
 from rcsc.desk.editor.places import Area, Lines, difference
 from rcsc.desk.editor.recovery import Rest, rest_of
-from rcsc.desk.editor.standing import BEING_PROVED, GIVEN_UP, standing
-from rcsc.desk.editor.values import Answer, Finding, Repair, Standing, Witness, WitnessLine
+from rcsc.desk.editor.values import (
+    BEING_PROVED,
+    GIVEN_UP,
+    Answer,
+    Finding,
+    Repair,
+    Standing,
+    Witness,
+    WitnessLine,
+    standing,
+)
 from rcsc.driver.proofs import table_report
 from rcsc.lang.model import Program
 from rcsc.lang.project import PROJECT_FILE, Loaded, load, project_root

@@ -26,8 +26,7 @@ from rcsc.desk.editor.places import Edit, Lines, difference
 from rcsc.desk.editor.recovery import declarations
 from rcsc.desk.editor.server.convert import Converter
 from rcsc.desk.editor.server.session import Session, current
-from rcsc.desk.editor.standing import BEING_PROVED
-from rcsc.desk.editor.values import Grid
+from rcsc.desk.editor.values import BEING_PROVED, Grid
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import resolve
 from rcsc.lang.resolve.program import closure
