@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.base.diagnostics.github import annotation
 from rcsc.base.diagnostics.jsonform import report_to_json
 from rcsc.base.diagnostics.printable import clip, escape, width
 from rcsc.base.diagnostics.render import full, one_line, paint, plain
 from rcsc.base.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
-from rcsc.base.diagnostics.sarif import fingerprint, sarif, uri
+from rcsc.base.diagnostics.services import annotation, fingerprint, sarif, uri
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.base.host.files.plain import plain as as_plain
 from rcsc.base.host.files.plain import read

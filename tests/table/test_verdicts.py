@@ -14,7 +14,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Severity
 from rcsc.base.diagnostics.jsonform import report_to_json
 from rcsc.base.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
-from rcsc.base.diagnostics.sarif import sarif
+from rcsc.base.diagnostics.services import sarif
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines

@@ -18,5 +18,5 @@ before it is shown.
 
 Modules, in the order the data flows: `source` (named texts and spans), `codes` (what each code means, with its
 example), `coded` (errors that know their code), `diagnostic`, `report` (what a command found and what backs it); then the
-forms of a report: `render` (text; `printable` makes user text safe), `jsonform`, `github`, `sarif`.
+forms of a report: `render` (text; `printable` makes user text safe), `jsonform`, `services` (SARIF, GitHub).
 """

@@ -15,7 +15,6 @@ import click
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
-from rcsc.base.diagnostics.github import annotations
 from rcsc.base.diagnostics.jsonform import report_to_json
 from rcsc.base.diagnostics.printable import escape, pad, width
 from rcsc.base.diagnostics.render import (
@@ -39,7 +38,7 @@ from rcsc.base.diagnostics.report import (
     named,
     trusting,
 )
-from rcsc.base.diagnostics.sarif import sarif
+from rcsc.base.diagnostics.services import annotations, sarif
 from rcsc.base.host.files import write_atomically
 
 
