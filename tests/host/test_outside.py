@@ -95,7 +95,7 @@ READERS_OF_FILES: Mapping[str, str] = {
     "rcsc/run/processes/supervisor.py": "/proc",
     "rcsc/run/processes/block.py": "shared memory of its own",
     "rcsc/run/campaign/journal.py": "is added to and read in one opening, regular and bounded by itself",
-    "rcsc/desk/shell/terminal.py": "is added to",
+    "rcsc/front/commands/systems/shell.py": "is added to",
     "rcsc/run/log/recorder.py": "is written",
     "rcsc/lang/syntax/parse.py": "comes with the compiler",
     "rcsc/desk/studio/server.py": "comes with the compiler",
@@ -849,7 +849,7 @@ def test_a_field_is_matched_to_its_end() -> None:
 # --- written whole or not at all -----------------------------------------------------------------
 
 SCRATCH = (
-    "rcsc/compose/counterexample/rerun.py", "rcsc/desk/shell/reload/sources.py", "rcsc/run/executors.py",
+    "rcsc/compose/counterexample/rerun.py", "rcsc/desk/shell/reload/reload.py", "rcsc/run/executors.py",
     "rcsc/views/diff/revision.py", "rcsc/code/testing/executors/native.py", "rcsc/code/testing/esbmc.py",
     "rcsc/code/testing/matcher.py", "rcsc/base/host/tools.py", "rcsc/code/testing/code_mutants.py", "rcsc/run/orders/together.py",
     "rcsc/run/link/beside.py", "rcsc/views/evidence/analysers.py", "rcsc/views/evidence/llvm.py", "rcsc/views/evidence/runtime.py",
@@ -860,7 +860,7 @@ STREAMS = (
     "rcsc/base/host/files/write.py",
     "rcsc/run/log/recorder.py",
     "rcsc/run/campaign/journal.py",
-    "rcsc/desk/shell/terminal.py",
+    "rcsc/front/commands/systems/shell.py",
     "rcsc/run/processes/block.py",
 )
 """The writer itself, what is added to at its end and read as far as it goes, and what is no file of the disk's."""

@@ -15,8 +15,7 @@ from click.testing import CliRunner
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import HELP, Commands
-from rcsc.desk.shell.reload.reload import Origin
-from rcsc.desk.shell.reload.sources import kept, laid_out
+from rcsc.desk.shell.reload.reload import Origin, kept, laid_out
 from rcsc.desk.shell.session import Session
 from rcsc.front.commands.group import commands as group
 from rcsc.run.adopt import Begun

@@ -21,8 +21,6 @@ nothing for a verdict; `reload` takes a table only if it proves, the present sta
 next cycle does what it did before, or `anyway` is given.
 
 Source: Haynes et al. 1984, sections 2 and 10. Modules, in the order the data flows: `opening` puts a system together,
-`terminal` reads lines,
-`commands` makes calls of them, `typed_names` and `queries` read names and conditions; a `session` does them on a
-running system, with `part_runs` (a procedure, a table, a step by itself), `stops` (breakpoints), `history` (undo) and
-`reload` (new tables).
+`commands` makes calls of lines, `typed_names` reads names; a `session` does them on a running system, with `part_runs`
+(a procedure, a table, a step by itself), `stops` (conditions, breakpoints), `history` (undo) and `reload` (new tables).
 """

@@ -14,8 +14,8 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.names import BadName, within
 from rcsc.desk.shell import typed_names
 from rcsc.desk.shell.part_runs import call_of, part_names
-from rcsc.desk.shell.queries import StateQuery, asked
 from rcsc.desk.shell.session import MOST_CYCLES, Session
+from rcsc.desk.shell.stops import StateQuery, asked
 from rcsc.desk.shell.typed_names import NamedLine
 from rcsc.lang.restart import COMMAND
 from rcsc.run.faults import faults_of

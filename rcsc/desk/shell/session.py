@@ -16,11 +16,10 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.described import nearest
 from rcsc.desk.shell import history, typed_names
 from rcsc.desk.shell.part_runs import run_part
-from rcsc.desk.shell.queries import StateQuery, question
 from rcsc.desk.shell.reload.composed import held_by, together
 from rcsc.desk.shell.reload.gate import Judged, Running, judge
 from rcsc.desk.shell.reload.reload import Origin, Reloaded, program_of, reload
-from rcsc.desk.shell.stops import Stops, reached, stands
+from rcsc.desk.shell.stops import StateQuery, Stops, question, reached, stands
 from rcsc.desk.shell.typed_names import NamedLine
 from rcsc.lang.model import Program
 from rcsc.proof.solvers.smt import spent
@@ -36,7 +35,7 @@ from rcsc.run.signature import Leaf, Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 
 if TYPE_CHECKING:
-    from rcsc.desk.shell.reload.sources import KeptSources
+    from rcsc.desk.shell.reload.reload import KeptSources
     from rcsc.run.log.recorder import Recorder
 
 MOST_CYCLES = 100_000

@@ -19,7 +19,7 @@ True
 
 Trusted: as for `rcsc check`, and `diff`. What it costs: a proof of the level, and one comparison.
 
-Modules, in the order the data flows: `sources` keeps what the running tables say, `reload` proves and compiles new
-ones, `gate` decides whether the level may take them where it stands, `composed` says what is known of them with their
+Modules, in the order the data flows: `reload` keeps what the running tables say, and proves and compiles new ones,
+`gate` decides whether the level may take them where it stands, `composed` says what is known of them with their
 neighbours.
 """

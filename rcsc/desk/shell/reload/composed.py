@@ -12,8 +12,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.report import named
 from rcsc.base.host.cache import Cache, open_cache
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict
-from rcsc.desk.shell.reload.reload import Origin, source_of
-from rcsc.desk.shell.reload.sources import KeptSources, kept
+from rcsc.desk.shell.reload.reload import KeptSources, Origin, kept, source_of
 from rcsc.driver.outline import known
 from rcsc.run.description import BadDescription, LevelSpec
 

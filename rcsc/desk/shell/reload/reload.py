@@ -1,12 +1,13 @@
 """New tables for a level that runs: proved and compiled beside it, in its present state.
 
 In: a running level, the system's description and where it stands. Out: `Reloaded`, or a refusal that says why; then the
-old level runs on. Whether it is taken is for `gate` to judge.
+old level runs on. Whether it is taken is for `gate` to judge. The sources of what runs are kept from before anybody edits them.
 """
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,13 +19,12 @@ from rcsc.base.diagnostics.report import Report
 from rcsc.base.host.children import scratch
 from rcsc.code.emit import TARGETS
 from rcsc.desk.shell.reload.gate import witness
-from rcsc.desk.shell.reload.sources import KeptSources, kept, laid_out
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.lang.hidden import fed_with
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Program, Value
-from rcsc.lang.project import load
+from rcsc.lang.project import PROJECT_FILE, load, project_root
 from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.run.description import BadDescription, Description, LevelSpec, places
@@ -35,6 +35,52 @@ from rcsc.run.signature import Leaf, Signature, generated_files, number_word, si
 from rcsc.run.system import Kind, executors
 
 MOST_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class KeptSources:
+    """A root file and all that it uses.
+
+    Attributes:
+        root: The root file below the project's folder.
+        texts: Contents by path below the project's folder; the project's own file, too.
+    """
+
+    root: str
+    texts: Mapping[str, bytes]
+
+
+def kept(source: Path) -> KeptSources:
+    """The texts as they are now, of exactly the files that a check reads; what cannot be read is left out."""
+    project = os.path.abspath(project_root(str(source)))
+    texts = {_below(name, project): file.text.encode() for name, file in load([str(source)]).sources.items()}
+    return KeptSources(_below(str(source), project), {PROJECT_FILE: b"", **texts})
+
+
+def _below(file: str, project: str) -> str:
+    """Return the path below the project's folder, by names or else by links; the whole path of a file elsewhere."""
+    whole = os.path.abspath(file)
+    folder, name = os.path.split(whole)
+    for path, above in (
+        (whole, project),
+        (os.path.join(os.path.realpath(folder), name), os.path.realpath(project)),
+    ):
+        if os.path.commonpath((path, above)) == above:
+            return os.path.relpath(path, above)
+    return whole
+
+
+@contextmanager
+def laid_out(held: KeptSources) -> Iterator[Path]:
+    """Write the files to a temporary folder, and give the root file there."""
+    with scratch("reload") as place:
+        for name, text in held.texts.items():
+            if os.path.isabs(name):
+                continue
+            path = place / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+        yield place / held.root
 
 
 @dataclass(frozen=True, slots=True)
