@@ -6,7 +6,6 @@ it found nothing wrong; nothing is written unless all that was asked for is prov
     check    load -> resolve -> prove             -> report
     compile  load -> resolve -> prove -> lower -> emit -> write -> report
     test     load -> resolve -> prove -> emit -> run against the interpreter -> report
-    certify  load -> resolve -> prove, or a kept certificate -> the checker -> report
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
@@ -25,6 +24,5 @@ Trusted: that only what was proved is emitted, which the types say (`lower` take
 
 Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check
 remembered), `proofs` (of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of
-the levels say), `watched` (what was proved of them, for `rcsc campaign`); then one for each command: `check`, `compile`, `trials`
-(`rcsc test`), `certified` (`rcsc certify`), `reformat` (`rcsc fmt`).
+the levels say), `watched` (what was proved of them, for `rcsc campaign`); then `check`, `compile` and `trials` (`rcsc test`).
 """

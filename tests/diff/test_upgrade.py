@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.driver.reformat import Formatted, reformat
 from rcsc.front.commands import run
+from rcsc.front.commands.tables.fmt import Formatted, reformat
 from rcsc.lang.model import Program, Value
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve

@@ -11,8 +11,8 @@ import pytest
 
 from rcsc.base.diagnostics.diagnostic import Severity
 from rcsc.base.diagnostics.source import Source
-from rcsc.driver.reformat import expand
 from rcsc.front.commands import run
+from rcsc.front.commands.tables.fmt import expand
 from rcsc.lang.interpret import evaluate, matching_lines
 from rcsc.lang.model import Bool, Enum, Int, Program, Value, key_bounds
 from rcsc.lang.resolve import compile_text
