@@ -59,8 +59,7 @@ def _grid(
         if groups[0] is not None
     )
     name = lines.area(file, written.named, written.named + len(written.name))
-    whole = lines.area(file, written.start, written.end)
-    return Grid(written.name, name, whole, columns, rows, standing)
+    return Grid(written.name, name, columns, rows, standing)
 
 
 def _columns(
@@ -118,23 +117,14 @@ def _row(
     shares: Mapping[str, tuple[int, int]],
     areas: Callable[[Cell], tuple[Area, ...]],
 ) -> GridRow:
-    """Return a line over the parts of its table; missing cells are empty, and stand at the end of the row."""
-    found = [None if group is None else joined_cells(group) for group in groups]
     first = groups[0]
     assert first is not None
-    conditions, actions = [], []
-    for group, cells, head in zip(groups, found, heads, strict=True):
-        end = Cell("", "", (group or first)[0].past)
-        conditions += _as_many([] if cells is None else cells.conditions[1:], len(head.conditions) - 1, end)
-        actions += _as_many([] if cells is None else cells.actions, len(head.actions), end)
+    stub, conditions, actions = line_cells(groups, heads)
     every = tuple(GridCell(cell.text, areas(cell)) for cell in (*conditions, *actions))
-    assert found[0] is not None
-    stub = found[0].conditions[0] if found[0].conditions else Cell("", "", first[0].start)
     name = stub_of(stub).name.text
     default = bool(conditions) and conditions[0].text.split()[:1] == ["DEFAULT"]
     return GridRow(
         name,
-        stub.text[len(name) :].strip(),
         every,
         default,
         shares.get(name),
@@ -143,8 +133,28 @@ def _row(
     )
 
 
+def line_cells(
+    groups: Sequence[Sequence[RowText] | None], heads: Sequence[Cells]
+) -> tuple[Cell, list[Cell], list[Cell]]:
+    """Return the name's cell, the conditions and the actions of a line over the parts of its table, as many as the headings have.
+
+    Missing cells are empty, and stand at the end of the row.
+    """
+    first = next(group for group in groups if group is not None)
+    stub = Cell("", "", first[0].start)
+    conditions, actions = list[Cell](), list[Cell]()
+    for at, (group, head) in enumerate(zip(groups, heads, strict=True)):
+        cells = Cells((), ()) if group is None else joined_cells(group)
+        end = Cell("", "", (group or first)[0].past)
+        conditions += _as_many(cells.conditions[1:], len(head.conditions) - 1, end)
+        actions += _as_many(cells.actions, len(head.actions), end)
+        if at == 0 and cells.conditions:
+            stub = cells.conditions[0]
+    return stub, conditions, actions
+
+
 def _as_many(cells: Sequence[Cell], count: int, end: Cell) -> list[Cell]:
-    return [*cells[:count], *([end] * (count - len(cells)))]
+    return [*cells[:count], *[end] * (count - len(cells))]
 
 
 def shares_of(program: Program, table: Table) -> dict[str, tuple[int, int]]:

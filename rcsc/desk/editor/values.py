@@ -142,7 +142,7 @@ class GridRow:
     """A line.
 
     Attributes:
-        name: Of the line; `marks`, what stands after it: `above ...`, `same ...`.
+        name: Of the line.
         cells: One a column.
         default: Whether it is the DEFAULT line; it then has no conditions.
         share: How many of the inputs in the declared ranges it matches, and of how many; None where nobody counted.
@@ -150,7 +150,6 @@ class GridRow:
     """
 
     name: str
-    marks: str
     cells: tuple[GridCell, ...]
     default: bool
     share: tuple[int, int] | None
@@ -164,12 +163,10 @@ class Grid:
 
     Attributes:
         name: What it is called; `area` is where that stands.
-        whole: From the word `table` to its brace.
     """
 
     name: str
     area: Area
-    whole: Area
     columns: tuple[GridColumn, ...]
     rows: tuple[GridRow, ...]
     standing: Standing

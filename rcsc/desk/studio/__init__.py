@@ -10,7 +10,8 @@ bounds, and a page that hangs holds nobody up.
 >>> message(id=1, answer={"tick": 5, "speed": float("inf")})
 '{"id":1,"answer":{"tick":5,"speed":"inf"}}'
 
-A new concern is a class with `name`, `lane`, `handlers`, `greeting`, `begin` and `close` and a line in `project`; a new view is a module of
+A new concern is a class with `name`, `lane`, a method `_on_VERB` for each kind of question, and perhaps `greeting`, `begin` and `close`,
+and a line in `project`; a new view is a module of
 `page/` with `mount(root, bus)` and a row in `page/views.js`.
 
 Nothing that a page sends is run or compiled but through the shell's commands and the prover. Who may see it: `rcsc.base.host.guard`.

@@ -7,7 +7,7 @@ killed when its question is cancelled, and never holds up the levels.
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import TimeoutError as NotYet
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,7 @@ from rcsc.base.host.children import WorkerEndedError, answer, executor, kill
 from rcsc.base.host.children import run as run_program
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.reload.composed import prove_levels
-from rcsc.desk.studio.hub import LATER, TOLD_S, Ask, CancelledError, Concern, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, TOLD_S, Ask, CancelledError, Concern, Hub, Json
 from rcsc.desk.studio.runs.live import LANE as RUN
 from rcsc.desk.studio.runs.live import Live
 from rcsc.driver.compile import compile_system
@@ -48,19 +48,11 @@ class Build(Concern):
         self._over = threading.Event()
         self._stop: Callable[[], None] = lambda: None
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"build.open": self._open, "build.prove": self._prove, "build.trust": self._trust}
-
     def prove_first(self, ask: Ask, then: Callable[[], Json]) -> Json:
         """Prove the levels together, beside them; then call `then` in the lane `run`, and answer with its result. From any lane."""
 
         def proved() -> Json:
-            try:
-                self._job(ask, ("proving the levels together", proved_together, (self._path,)))
-            finally:
-                self._told("")
+            self._waited(ask, "proving the levels together", proved_together, self._path)
             self._hub.do(RUN, lambda: ask.done(then))
             return LATER
 
@@ -83,7 +75,7 @@ class Build(Concern):
             self._hub.do(RUN, lambda: self._live.close_because(ASKS))
             return
         try:
-            self._compile(lambda work: self._waited(work, self._told))
+            self._compile(None)
         except CancelledError:
             return  # the studio ends
         except BaseException as error:
@@ -100,39 +92,26 @@ class Build(Concern):
         self._said = {**self._said, "doing": text}
         self._hub.tell("build.state", self._said)
 
-    def _open(self, ask: Ask) -> Json:
+    def _on_open(self, ask: Ask) -> Json:
         """Compile whatever changed, and open the system anew."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
         if not self._agreement.given:
             raise Refused(Code.STUDIO, ASKS, "agree to it in the page, or start the studio with `--trust`")
-        return self._compile(lambda work: self._job(ask, work))
+        return self._compile(ask)
 
-    def _trust(self, ask: Ask) -> Json:
+    def _on_trust(self, ask: Ask) -> Json:
         """Let the folder's code run, now and whenever it is opened; then compile and open the system."""
         self._agreement.give()
-        return self._open(ask)
+        return self._on_open(ask)
 
-    def _job(self, ask: Ask, work: tuple[str, Callable[..., T], tuple[Any, ...]]) -> T:
-        def told(text: str) -> None:
-            self._told(text)
-            ask.progress(text)
-
-        return self._waited(work, told, ask)
-
-    def _waited(
-        self,
-        work: tuple[str, Callable[..., T], tuple[Any, ...]],
-        told: Callable[[str], None],
-        ask: Ask | None = None,
-    ) -> T:
-        """Run some work in a process of its own, and report regularly which work it is and how long it has taken.
+    def _waited(self, ask: Ask | None, what: str, function: Callable[..., T], *arguments: Any) -> T:
+        """Run some work in a process of its own, and report regularly, also to who asked, what it is and how long it has taken.
 
         Raises:
             CancelledError: The question was cancelled, or the studio ends; the process is gone.
             WorkerEndedError: The process ended without an answer.
         """
-        what, function, arguments = work
         processes, begun_s = executor(1), time.monotonic()
         self._stop = lambda: kill(processes)
         if ask is not None:
@@ -140,7 +119,10 @@ class Build(Concern):
         try:
             future = processes.submit(function, *arguments)
             while not self._over.is_set():
-                told(f"{what}, {time.monotonic() - begun_s:.0f} s")
+                text = f"{what}, {time.monotonic() - begun_s:.0f} s"
+                self._told(text)
+                if ask is not None:
+                    ask.progress(text)
                 try:
                     future.exception(TOLD_S)
                 except NotYet:
@@ -156,12 +138,10 @@ class Build(Concern):
         finally:
             kill(processes)
             processes.shutdown(wait=False, cancel_futures=True)
-
-    def _compile(self, job: Callable[[tuple[str, Callable[..., Any], tuple[Any, ...]]], Any]) -> Json:
-        try:
-            report = job(("proving and compiling the tables", compiled, (self._path,)))
-        finally:
             self._told("")
+
+    def _compile(self, ask: Ask | None) -> Json:
+        report = self._waited(ask, "proving and compiling the tables", compiled, self._path)
         errors = [one for one in report["diagnostics"] if one["severity"] == "error"]
         self._said = {
             "doing": "",
@@ -176,23 +156,18 @@ class Build(Concern):
         else:
             first = errors[0]["message"] if errors else report.get("why", "")
             more = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
-            self._hub.do(
-                RUN,
-                lambda: self._live.close_because(f"its tables were not proved and compiled: {first}{more}"),
-            )
+            why = f"its tables were not proved and compiled: {first}{more}"
+            self._hub.do(RUN, lambda: self._live.close_because(why))
         return {"ok": report["ok"], "findings": report["diagnostics"]}
 
-    def _prove(self, ask: Ask) -> Json:
+    def _on_prove(self, ask: Ask) -> Json:
         """Prove the levels together, and keep counterexamples as logs."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
         folder = self._path.parent / FOUND
         before = _logs(folder)
         arguments = ("prove", str(self._path), "--log", str(folder))
-        try:
-            status, text = self._job(ask, ("proving the levels together", commanded, (arguments,)))
-        finally:
-            self._told("")
+        status, text = self._waited(ask, "proving the levels together", commanded, arguments)
         new = sorted(name for name, changed in _logs(folder).items() if before.get(name) != changed)
         return {"status": status, "text": text[:MOST_TEXT], "logs": new}
 

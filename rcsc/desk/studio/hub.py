@@ -152,7 +152,7 @@ Raises:
 
 
 class Concern:
-    """What answers questions of some kinds.
+    """What answers questions of some kinds: one of kind `NAME.VERB` with its method `_on_VERB`.
 
     Attributes:
         name: The first part of its kinds.
@@ -164,8 +164,9 @@ class Concern:
 
     @property
     def handlers(self) -> Mapping[str, Handler]:
-        """By kind, `NAME.VERB`."""
-        raise NotImplementedError
+        """By kind."""
+        found = (verb.removeprefix("_on_") for verb in dir(self) if verb.startswith("_on_"))
+        return {f"{self.name}.{verb}": getattr(self, f"_on_{verb}") for verb in found}
 
     def greeting(self) -> Json:
         """What a page is told of it as it opens; called in its lane."""

@@ -5,13 +5,13 @@ is no value (`rcsc.run.unset`): the curve has a gap there.
 """
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, Ask, Concern, Hub, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
@@ -80,16 +80,11 @@ class Plots(Concern):
         self._finding: Iterator[None] = iter(())
         self._of: tuple[object, int] = (None, -1)
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"plot.names": self._names, "plot.curves": self._curves}
-
     def close(self) -> None:
         """Forget the curves found so far."""
         self._known, self._finding = {}, iter(())
 
-    def _names(self, _: Ask) -> Json:
+    def _on_names(self, _: Ask) -> Json:
         """Every variable by its whole name, and those that the system's description shows, by set."""
         log = self._time.history().logs[-1]
         names = [
@@ -109,7 +104,7 @@ class Plots(Concern):
         there = {name: [each for each in shown if each in known] for name, shown in sets.items()}
         return {name: shown for name, shown in there.items() if shown}
 
-    def _curves(self, ask: Ask) -> Json:
+    def _on_curves(self, ask: Ask) -> Json:
         """Return the changes of some variables: `[tick, value]`, null where nobody has set one; a long run is read in pieces."""
         names = ask.body.members("names")
         if len(names) > MOST_NAMES:
@@ -121,7 +116,7 @@ class Plots(Concern):
 
         def piece() -> Json:
             if (self._time.source.history, self._time.source.history.era) != (history, self._of[1]):
-                return self._curves(ask)  # it is another run by now
+                return self._on_curves(ask)  # it is another run by now
             behind = [
                 one
                 for traced in wanted

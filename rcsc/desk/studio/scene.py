@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.session import Session
-from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Json
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
 from rcsc.run.levels import RunningLevel, StateTableError
@@ -79,13 +79,6 @@ class Scene(Concern):
         self._pictured, self._why = False, NO_SPACE
         time.live.opened.append(self._opened)
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "cell.space": self._shapes, "cell.poses": self._at, "cell.trace": self._trace, "cell.drawing": self._drawn,
-        }  # fmt: skip
-
     def greeting(self) -> Json:
         """Return whether there is a scene, with the reason if there is none, and whether drawings can be made."""
         return {
@@ -115,12 +108,12 @@ class Scene(Concern):
 
     # --- questions ---
 
-    def _shapes(self, _: Ask) -> Json:
+    def _on_space(self, _: Ask) -> Json:
         if self._space is None:
             raise Refused(Code.STUDIO, self._why)
         return {"bodies": list(self._space.bodies), "shapes": [asdict(shape) for shape in self._space.shapes]}
 
-    def _at(self, ask: Ask) -> Json:
+    def _on_poses(self, ask: Ask) -> Json:
         tick = ask.body.whole("tick", 0, 2**53)
         if self._time.source.log is not None:
             raise Refused(Code.STUDIO, NO_POSES)
@@ -129,7 +122,7 @@ class Scene(Concern):
             raise Refused(Code.STUDIO, f"the poses of tick {tick} are not kept any more")
         return {"tick": tick, "poses": [round(number, 5) for number in array("f", held)]}
 
-    def _trace(self, ask: Ask) -> Json:
+    def _on_trace(self, ask: Ask) -> Json:
         """Return the path of a body up to a tick: points of three numbers, at most `MOST_TRACED` of them, at even distances."""
         tick, body = ask.body.whole("tick", 0, 2**53), ask.body.whole("body", 0, 100_000)
         if self._time.source.log is not None:
@@ -142,7 +135,7 @@ class Scene(Concern):
             "points": [[round(number, 5) for number in point] for point in shown if len(point) == 3],
         }
 
-    def _drawn(self, ask: Ask) -> Json:
+    def _on_drawing(self, ask: Ask) -> Json:
         history = self._time.history()
         tick = ask.body.whole("tick", history.first, history.last)
         return {"tick": tick, **self.drawing(tick, projected=ask.body.flag("projected"))}

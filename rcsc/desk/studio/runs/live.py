@@ -5,7 +5,7 @@ that a pause is heard between two of them; nothing here waits for a page, and a 
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field
 from itertools import islice
@@ -17,7 +17,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import Commands, Output, RunOrder
 from rcsc.desk.shell.opening import Opening, opened
 from rcsc.desk.shell.session import Session
-from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.lang.project import project_root
 from rcsc.run.faults import faults_of
@@ -140,13 +140,6 @@ class Live(Concern):
         self._rate, self._runs = pace.rate, pace.runs
         self._told_s = 0.0
         self._rows: object = None
-
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "run.type": self._type, "run.go": self._go, "run.pause": self._pause, "run.rate": self._set_rate, "run.words": self._words,
-        }  # fmt: skip
 
     def greeting(self) -> Json:
         """Return the state, and tell the page the script's rows and the orders."""
@@ -297,7 +290,7 @@ class Live(Concern):
 
     # --- what pages do ---
 
-    def _type(self, ask: Ask) -> Json:
+    def _on_type(self, ask: Ask) -> Json:
         """Run a line as the shell does; one that runs cycles is answered when they are done."""
         line = ask.body.text("line")
         if len(line) > LONGEST_LINE:
@@ -337,7 +330,7 @@ class Live(Concern):
             self._mark(tick, "hand", line.strip())
         return {"shown": shown}
 
-    def _go(self, ask: Ask) -> Json:
+    def _on_go(self, ask: Ask) -> Json:
         """Run until a breakpoint, a pause or the end of the script; answer at once."""
         self._open_commands()
         ask.check()
@@ -358,12 +351,12 @@ class Live(Concern):
         self._slice(self._going)
         return LATER
 
-    def _pause(self, _: Ask) -> Json:
+    def _on_pause(self, _: Ask) -> Json:
         if self._going is not None:
             self._end(f"cycle {self.session().system.tick}: paused")
         return self.state()
 
-    def _set_rate(self, ask: Ask) -> Json:
+    def _on_rate(self, ask: Ask) -> Json:
         """Set the rate: times as fast as the clock; `null` as fast as it goes."""
         rate = ask.body.number("rate", None)
         if rate is not None and not 0.01 <= rate <= FASTEST:
@@ -374,7 +367,7 @@ class Live(Concern):
         self.changed()
         return self.state()
 
-    def _words(self, ask: Ask) -> Json:
+    def _on_words(self, ask: Ask) -> Json:
         """Return the possible words that contain a given part."""
         part = ask.body.text("part").casefold()
         with PROVER:

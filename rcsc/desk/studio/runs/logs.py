@@ -7,7 +7,7 @@ a proof wrote into it, or that a campaign put beside it, as `finding.json` in th
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.read import json_of, text
-from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Json
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log, UnreadableLog, finding_at_the_head, read
 
@@ -105,17 +105,12 @@ class Logs(Concern):
         """Args: folders: Where logs are looked for; given: Logs that the user named; show: Takes one that was read, and what it breaks."""
         self._folders, self._given, self._show = folders, given, show
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"log.list": self._list, "log.open": self._open}
-
     def begin(self) -> None:
         """Show the first log that the user named, if any."""
         for path in self._given[:1]:
             self._open_at(self._called(path), path)
 
-    def _list(self, ask: Ask) -> Json:
+    def _on_list(self, ask: Ask) -> Json:
         """Return the latest logs, each with its finding."""
         found = []
         for name, path in self._found().items():
@@ -135,7 +130,7 @@ class Logs(Concern):
             )
         return told
 
-    def _open(self, ask: Ask) -> Json:
+    def _on_open(self, ask: Ask) -> Json:
         name = ask.body.text("name")
         path = self._found().get(name)
         if path is None:

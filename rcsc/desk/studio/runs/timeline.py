@@ -12,7 +12,7 @@ from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import PROVER, Ask, Concern, Json
 from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import LANE, Live, level_shown, range_of
 from rcsc.desk.studio.runs.logs import KeptFinding
@@ -71,14 +71,6 @@ class TimeLine(Concern):
         self._log: Source | None = None
         self._lines, self._shown = Lines(), Shown()
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "time.tracks": self._tracks, "time.moment": self._moment, "time.values": self._values, "time.why": self._why,
-            "time.find": self._find, "time.live": self._to_live,
-        }  # fmt: skip
-
     def greeting(self) -> Json:
         """Return the run that everybody looks at."""
         return self.state()
@@ -123,7 +115,7 @@ class TimeLine(Concern):
         self._log = Source(name, History([log]), log, finding)
         self._tell("time.state", self.state())
 
-    def _to_live(self, _: Ask) -> Json:
+    def _on_live(self, _: Ask) -> Json:
         self._log = None
         self._tell("time.state", self.state())
         return self.state()
@@ -152,10 +144,10 @@ class TimeLine(Concern):
         except KeyError as error:
             raise Refused(Code.STUDIO, f"the run has no level `{name}`") from error
 
-    def _moment(self, ask: Ask) -> Json:
+    def _on_moment(self, ask: Ask) -> Json:
         return self._shown.moment(self.history(), self._tick(ask))
 
-    def _tracks(self, ask: Ask) -> Json:
+    def _on_tracks(self, ask: Ask) -> Json:
         """Every change of a level's line after a tick; `era` says whether what the page has is still so."""
         history = self.history()
         since = ask.body.whole("since", -1, 2**53)
@@ -179,7 +171,7 @@ class TimeLine(Concern):
 
     # --- values ---
 
-    def _values(self, ask: Ask) -> Json:
+    def _on_values(self, ask: Ask) -> Json:
         """Return every variable of a level as a tick left it, and whether the tick changed it."""
         tick = self._tick(ask)
         history = self.history()
@@ -200,7 +192,7 @@ class TimeLine(Concern):
 
     # --- questions about a cycle ---
 
-    def _why(self, ask: Ask) -> Json:
+    def _on_why(self, ask: Ask) -> Json:
         """Return each table that a level's cycle tried, and for each of its lines the conditions that did not hold."""
         tick = self._tick(ask)
         logged = self._level(ask, tick)
@@ -240,7 +232,7 @@ class TimeLine(Concern):
             raise Refused(Code.STUDIO, f"level `{logged.name}` ran other tables then than it runs now")
         return session.program(level)
 
-    def _find(self, ask: Ask) -> Json:
+    def _on_find(self, ask: Ask) -> Json:
         """Find the next tick, or the one before, in which a condition holds; null where there is none."""
         text = ask.body.text("text")
         if len(text) > LONGEST:

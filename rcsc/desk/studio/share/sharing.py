@@ -6,19 +6,18 @@ asked writes it where its user says.
 
 import itertools
 import re
-from collections.abc import Mapping
 from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.studio.hub import LATER, Ask, Concern, Handler, Hub, Json
+from rcsc.desk.studio.hub import LATER, Ask, Concern, Hub, Json
 from rcsc.desk.studio.runs.live import LANE
 from rcsc.desk.studio.runs.timeline import TimeLine
 from rcsc.desk.studio.scene import Scene
 from rcsc.desk.studio.share.document import of_film, of_finding
 from rcsc.desk.studio.share.film import film
 from rcsc.desk.studio.tables import shown
-from rcsc.desk.studio.tables.desk import PROOF, Desk
+from rcsc.desk.studio.tables.desk import PROOF, Desk, seen
 
 MOST_AROUND = 1000
 _ODD = re.compile(r"[^A-Za-z0-9_]+")
@@ -33,12 +32,7 @@ class Moments(Concern):
         """Args: hub: Does things in lanes; time: The run; cell: What stands outside."""
         self._hub, self._time, self._cell = hub, time, cell
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"share.moment": self._moment}
-
-    def _moment(self, ask: Ask) -> Json:
+    def _on_moment(self, ask: Ask) -> Json:
         """Gather ticks one after another, the lane free for others in between."""
         history = self._time.history()
         era = history.era
@@ -71,13 +65,8 @@ class Findings(Concern):
         """Args: desk: The open files."""
         self._desk = desk
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"handed.finding": self._finding}
-
-    def _finding(self, ask: Ask) -> Json:
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+    def _on_finding(self, ask: Ask) -> Json:
+        name, version = seen(ask)
         number = ask.body.whole("finding", 0, 1_000_000)
         known = self._desk.known(name, version)
         offered = self._desk.repairs(name, version, number)

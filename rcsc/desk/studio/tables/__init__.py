@@ -4,9 +4,9 @@ A file is opened once for all pages (`document`): its text, one history of chang
 A change comes as an edit of the text or of cells (`cells`), names the version that its page has seen, and is told to all. After it the
 text is looked at in another thread; what is known of an older text is never shown beside a newer one.
 
->>> from rcsc.desk.studio.tables.cells import GridCell, with_cells
+>>> from rcsc.desk.studio.tables.cells import with_cells
 >>> text = "input a : bool\ntable t {\n| line | a ||\n|------|---||\n| 1 | true ||\n}\n"
->>> print(with_cells(text, "t", [(GridCell(0, 0), "false")]).splitlines()[-2])
+>>> print(with_cells(text, "t", {(0, 0): "false"}).splitlines()[-2])
   | 1    | false ||
 
 A cell is what was typed, or nothing is changed: after each change the table is read again from the text. What a grid shows of findings,

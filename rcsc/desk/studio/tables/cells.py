@@ -5,12 +5,14 @@ cell; where it does not say what was asked for, nothing is changed. Comments sta
 a text that parses is laid out as `rcsc fmt` does it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
+from rcsc.desk.editor.grid import line_cells
 from rcsc.lang.syntax.rows import Cell, Cells, stub_of
 from rcsc.lang.written.changes import Splice, formatted, new_line, over, row_text, spliced
 from rcsc.lang.written.tables import (
@@ -34,14 +36,6 @@ STUB = -1
 
 
 @dataclass(frozen=True, slots=True)
-class GridCell:
-    """A cell: line and column from 0; conditions of all parts are counted first, then actions. Line -1 is the heading."""
-
-    line: int
-    column: int
-
-
-@dataclass(frozen=True, slots=True)
 class Sheet:
     """A table, cell by cell.
 
@@ -58,48 +52,22 @@ class Sheet:
 
 def sheet_of(table: WrittenTable) -> Sheet:
     """Return the cells of a table."""
-    parts = [_read(part) for part in table.parts]
-    many = max((len(part.lines) for part in table.parts), default=0)
-    headings = [cell.text for heading, _ in parts for cell in heading.conditions[1:]]
-    conditions = len(headings)
-    headings += [cell.text for heading, _ in parts for cell in heading.actions]
-    rows = [
-        (
-            *(
-                cell.text
-                for _, lines in parts
-                for cell in (lines[at].conditions[1:] if at < len(lines) else ())
-            ),
-            *(cell.text for _, lines in parts for cell in (lines[at].actions if at < len(lines) else ())),
-        )
-        for at in range(many)
-    ]
-    stubs = [lines.conditions[0].text if lines.conditions else "" for lines in (parts[0][1] if parts else [])]
-    return Sheet(tuple(headings), conditions, tuple(stubs), tuple(rows))
-
-
-def _read(part: WrittenPart) -> tuple[Cells, list[Cells]]:
-    """Return the cells of a part; rows with too many or too few are fitted to its heading."""
-    heading = joined_cells(part.heading)
-    return heading, [_fitted(joined_cells(rows), heading, rows[0].past) for rows in part.lines]
-
-
-def _fitted(cells: Cells, heading: Cells, past: int) -> Cells:
-    end = Cell("", "", past)
-
-    def as_many(own: Sequence[Cell], count: int) -> tuple[Cell, ...]:
-        return (*own[:count], *[end] * (count - len(own)))
-
-    return Cells(
-        as_many(cells.conditions, len(heading.conditions)), as_many(cells.actions, len(heading.actions))
-    )
+    heads = [joined_cells(part.heading) for part in table.parts]
+    conditions = [cell.text for head in heads for cell in head.conditions[1:]]
+    actions = [cell.text for head in heads for cell in head.actions]
+    lines = [line_cells(groups, heads) for groups in zip_longest(*(part.lines for part in table.parts))]
+    stubs = tuple(stub.text for stub, _, _ in lines)
+    rows = tuple(tuple(cell.text for cell in (*own, *does)) for _, own, does in lines)
+    return Sheet((*conditions, *actions), len(conditions), stubs, rows)
 
 
 # --- changes ------------------------------------------------------------------------------
 
 
-def with_cells(text: str, name: str, changes: Sequence[tuple[GridCell, str]]) -> str:
+def with_cells(text: str, name: str, changes: Mapping[tuple[int, int], str]) -> str:
     """Write cells, headings and stubs; a line's new name is written in every part, and where other lines name it.
+
+    A cell is named by line and column from 0; conditions of all parts are counted first, then actions. Line -1 is the heading.
 
     Raises:
         Refused: There is no such cell, or the text would not say what was asked for.
@@ -108,27 +76,30 @@ def with_cells(text: str, name: str, changes: Sequence[tuple[GridCell, str]]) ->
     before = sheet_of(table)
     if len(changes) > MOST_CELLS:
         raise Refused(Code.STUDIO, f"more than {MOST_CELLS} cells at once")
-    wanted = {place: _checked(new) for place, new in changes}
+    wanted = {place: _checked(new) for place, new in changes.items()}
     splices = list[Splice]()
     headings, stubs, cells = list(before.headings), list(before.stubs), [list(row) for row in before.cells]
-    for place, new in wanted.items():
-        if not (-1 <= place.line < len(before.stubs) and -1 <= place.column < len(before.headings)):
-            raise Refused(
-                Code.STUDIO, f"table `{name}` has no cell in line {place.line + 1}, column {place.column + 1}"
-            )
-        if place.column == STUB:
-            if place.line < 0:
+    for (line, column), new in wanted.items():
+        if not (-1 <= line < len(before.stubs) and -1 <= column < len(before.headings)):
+            raise Refused(Code.STUDIO, f"table `{name}` has no cell in line {line + 1}, column {column + 1}")
+        if column == STUB:
+            if line < 0:
                 raise Refused(Code.STUDIO, "the heading of the first column is `line`")
-            stubs[place.line] = new
-        elif place.line < 0:
-            headings[place.column] = new
+            stubs[line] = new
+            continue
+        if line < 0:
+            headings[column] = new
         else:
-            cells[place.line][place.column] = new
-        if place.column != STUB:
-            splices += _cell_splices(text, table, place, new)
-    splices += _stub_splices(table, before.stubs, stubs)
-    after = Sheet(tuple(headings), before.conditions, tuple(stubs), tuple(map(tuple, cells)))
-    return _sure(text, name, spliced(text, splices), _renamed(before, after))
+            cells[line][column] = new
+        splices += _cell_splices(text, table, line, column, new)
+    names = [(name_of(old), name_of(new)) for old, new in zip(before.stubs, stubs, strict=True)]
+    renamed = {old: new for old, new in names if old and old != new}
+    splices += _stub_splices(table, before.stubs, stubs, renamed)
+    wanted_stubs = (
+        _renamed(new, renamed) if new == old else new for old, new in zip(before.stubs, stubs, strict=True)
+    )
+    after = Sheet(tuple(headings), before.conditions, tuple(wanted_stubs), tuple(map(tuple, cells)))
+    return _sure(text, name, spliced(text, splices), after)
 
 
 def with_line(text: str, name: str, at: int, cells: Sequence[str] = (), stub: str = "") -> str:
@@ -318,51 +289,39 @@ def _sure(before: str, name: str, after: str, wanted: Sheet) -> str:
     return formatted(Source("", after), "\n") or after if before != after else after
 
 
-def _cell_splices(text: str, table: WrittenTable, place: GridCell, new: str) -> Sequence[Splice]:
+def _cell_splices(text: str, table: WrittenTable, line: int, column: int, new: str) -> Sequence[Splice]:
     """Return what writes a cell into the first of its rows, and takes it out of the others."""
-    found = written_cell(table, place.line, place.column)
+    found = written_cell(table, line, column)
     if found is None:
         raise Refused(Code.STUDIO, "this line has other cells than the heading", "mend it in the text")
     return over(text, found[1], new, found[0])
 
 
-def _stub_splices(table: WrittenTable, before: Sequence[str], after: Sequence[str]) -> Iterator[Splice]:
+def _stub_splices(
+    table: WrittenTable, before: Sequence[str], after: Sequence[str], renamed: Mapping[str, str]
+) -> Iterator[Splice]:
     """Yield the splices that write changed stubs in every part, and new names where other lines name a line by its old one."""
-    renamed = {
-        name_of(old): name_of(new)
-        for old, new in zip(before, after, strict=True)
-        if name_of(old) != name_of(new) and name_of(old)
-    }
-    if not renamed and before == after:
+    if tuple(before) == tuple(after):
         return
     for number, part in enumerate(table.parts):
-        first = number == 0
         for at, rows in enumerate(part.lines):
             stub = joined_cells(rows).conditions[0]
             if at < len(before) and before[at] != after[at]:
-                new = after[at] if first else name_of(after[at])
-                yield (*pieces(stub)[0], new)
-            elif first:
-                for mark in (*stub_of(stub).above, *stub_of(stub).same):
-                    if mark.text in renamed:
-                        yield mark.start, mark.start + len(mark.text), renamed[mark.text]
+                yield (*pieces(stub)[0], after[at] if number == 0 else name_of(after[at]))
+            elif number == 0:
+                yield from _mark_splices(stub, renamed)
 
 
-def _renamed(before: Sheet, after: Sheet) -> Sheet:
-    """Return the wanted sheet, in which lines that name others follow a new name."""
-    renamed = {
-        name_of(old): name_of(new)
-        for old, new in zip(before.stubs, after.stubs, strict=True)
-        if name_of(old) != name_of(new) and name_of(old)
-    }
-    stubs = list(after.stubs)
-    for at, stub in enumerate(stubs):
-        if stub == before.stubs[at]:
-            cell = stub_of(Cell(stub, "", 0))
-            marks = [mark for mark in (*cell.above, *cell.same) if mark.text in renamed]
-            splices = [(mark.start, mark.start + len(mark.text), renamed[mark.text]) for mark in marks]
-            stubs[at] = spliced(stub, splices)
-    return Sheet(after.headings, after.conditions, tuple(stubs), after.cells)
+def _mark_splices(stub: Cell, renamed: Mapping[str, str]) -> Iterator[Splice]:
+    """Yield the splices that write new names where a stub names other lines."""
+    marked = stub_of(stub)
+    for mark in (*marked.above, *marked.same):
+        if mark.text in renamed:
+            yield mark.start, mark.start + len(mark.text), renamed[mark.text]
+
+
+def _renamed(stub: str, renamed: Mapping[str, str]) -> str:
+    return spliced(stub, list(_mark_splices(Cell(stub, "", 0), renamed)))
 
 
 def _part_of(table: WrittenTable, at: int, *, action: bool, inside: bool = False) -> tuple[WrittenPart, int]:

@@ -20,7 +20,7 @@ from rcsc.base.host.files.read import Malformed, beginning
 from rcsc.desk.editor.memo import OutdatedError
 from rcsc.desk.editor.values import Answer, Repair
 from rcsc.desk.editor.workspace import Checked, Workspace
-from rcsc.desk.studio.hub import PROVER
+from rcsc.desk.studio.hub import PROVER, Ask
 from rcsc.desk.studio.tables.document import Document
 from rcsc.desk.studio.tables.shown import Json, TextFindings, document
 from rcsc.lang.project import listed, load, project_root
@@ -40,6 +40,11 @@ UNSAVED = "unsaved"
 """The folder, beside what else is kept, for texts that nobody had saved when the studio ended."""
 MOST_LISTED_BYTES = 300_000
 """Of a file whose tables are listed before it is opened."""
+
+
+def seen(ask: Ask) -> tuple[str, int]:
+    """Return the file that a question is about, and the version of its text that the page has seen."""
+    return ask.body.text("file"), ask.body.whole("version", 1, 2**53)
 
 
 class Desk:

@@ -11,10 +11,11 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.read import CheckedFields
 from rcsc.desk.editor import keys
 from rcsc.desk.editor.places import Area, Edit, Lines, Place, Units
-from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import Ask, Concern, Json
 from rcsc.desk.studio.tables import cells
-from rcsc.desk.studio.tables.desk import Desk
+from rcsc.desk.studio.tables.desk import Desk, seen
 from rcsc.desk.studio.tables.document import MOST_BYTES, Document, plain
+from rcsc.lang.written.tables import table_of
 
 LOOKED_S = 0.5
 """So often is looked whether others wrote into the files that are open."""
@@ -53,16 +54,6 @@ class Tables(Concern):
         """
         self._desk, self._part, self._later = desk, part, later
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "tables.list": lambda _: self._desk.files(), "tables.open": self._open, "tables.edit": self._edit,
-            "tables.cells": self._cells, "tables.line": self._line, "tables.delete": self._delete, "tables.column": self._column,
-            "tables.key": self._key, "tables.undo": self._undo, "tables.redo": self._redo, "tables.save": self._save,
-            "tables.take": self._take,
-        }  # fmt: skip
-
     def greeting(self) -> Json:
         """Return the files that have tables."""
         return {"files": self._desk.files()}
@@ -79,7 +70,10 @@ class Tables(Concern):
         for said in self._desk.keep_unsaved():
             self._part(said)
 
-    def _open(self, ask: Ask) -> Json:
+    def _on_list(self, _: Ask) -> Json:
+        return self._desk.files()
+
+    def _on_open(self, ask: Ask) -> Json:
         """Open a file; one without changes here is read again if others changed it."""
         name = ask.body.text("file")
         found = self._desk.opened(name)
@@ -103,7 +97,7 @@ class Tables(Concern):
 
     def _done(self, ask: Ask, change: Callable[[Document], object]) -> Json:
         """Do a change to the text that the page has seen, and to no other."""
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
 
         def of_that(found: Document) -> object:
             self._desk.at(name, version)
@@ -111,22 +105,22 @@ class Tables(Concern):
 
         return self._desk.change(name, of_that)
 
-    def _edit(self, ask: Ask) -> Json:
+    def _on_edit(self, ask: Ask) -> Json:
         """Make edits of the text, as they are typed."""
         given = list(ask.body.each("edits", MOST_EDITS))
 
         def make(found: Document) -> tuple[str, str]:
             lines = Lines(found.text)
-            edits = [_edit(found.file, lines, each) for each in given]
+            edits = [_edit_of(found.file, lines, each) for each in given]
             return found.edited(edits), "type"
 
         return self._changed(ask, make)
 
-    def _cells(self, ask: Ask) -> Json:
+    def _on_cells(self, ask: Ask) -> Json:
         """Write cells, from a corner on: one, or a rectangle that was pasted; lines that are missing are added."""
         table = ask.body.text("table")
         line, column = ask.body.whole("line", -1, MOST_LINES), ask.body.whole("column", -1, MOST_LINES)
-        rows = [each.texts for each in map(_Row, ask.body.each("rows", cells.MOST_CELLS))]
+        rows = list(map(_row, ask.body.each("rows", cells.MOST_CELLS)))
         what = "write a cell" if len(rows) == 1 and len(rows[0]) == 1 else "paste"
 
         def make(found: Document) -> tuple[str, str]:
@@ -136,22 +130,22 @@ class Tables(Concern):
             text = _longer(
                 found.text, table, line + len(rows) + _over_default(found.text, table, line, column, rows)
             )
-            changes = [
-                (cells.GridCell(line + down, column + right), new)
+            changes = {
+                (line + down, column + right): new
                 for down, row in enumerate(rows)
                 for right, new in enumerate(row)
                 if new is not None
-            ]
+            }
             return cells.with_cells(text, table, changes), what
 
         return self._changed(ask, make)
 
-    def _line(self, ask: Ask) -> Json:
+    def _on_line(self, ask: Ask) -> Json:
         """Insert a line."""
         table, at = ask.body.text("table"), ask.body.whole("at", 0, MOST_LINES)
         return self._changed(ask, lambda found: (cells.with_line(found.text, table, at), "insert a line"))
 
-    def _delete(self, ask: Ask) -> Json:
+    def _on_delete(self, ask: Ask) -> Json:
         """Delete lines, or a column."""
         table = ask.body.text("table")
         if "column" in ask.body.value:
@@ -163,7 +157,7 @@ class Tables(Concern):
         many = "delete a line" if len(lines) == 1 else f"delete {len(lines)} lines"
         return self._changed(ask, lambda found: (cells.without_lines(found.text, table, lines), many))
 
-    def _column(self, ask: Ask) -> Json:
+    def _on_column(self, ask: Ask) -> Json:
         """Insert a column."""
         table, at = ask.body.text("table"), ask.body.whole("at", 0, MOST_LINES)
         heading, action = ask.body.text("heading"), ask.body.flag("action")
@@ -175,12 +169,10 @@ class Tables(Concern):
             ),
         )
 
-    def _key(self, ask: Ask) -> Json:
+    def _on_key(self, ask: Ask) -> Json:
         """Do what a key does in a table of the text; return the cursor, null where it is in none."""
-        key, at = (
-            ask.body.text("key"),
-            Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES)),
-        )
+        key = ask.body.text("key")
+        at = Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES))
         if key not in KEYS:
             raise Refused(Code.STUDIO, f"no key is called `{key}`")
         act, what = KEYS[key]
@@ -197,33 +189,28 @@ class Tables(Concern):
 
         return self._changed(ask, make) | {"cursor": cursor}
 
-    def _undo(self, ask: Ask) -> Json:
+    def _on_undo(self, ask: Ask) -> Json:
         return self._done(ask, Document.undo)
 
-    def _redo(self, ask: Ask) -> Json:
+    def _on_redo(self, ask: Ask) -> Json:
         return self._done(ask, Document.redo)
 
-    def _save(self, ask: Ask) -> Json:
+    def _on_save(self, ask: Ask) -> Json:
         """Write a file; report whether it was laid out."""
         over = ask.body.flag("over")
         return self._desk.change(ask.body.text("file"), lambda found: found.save(over=over))
 
-    def _take(self, ask: Ask) -> Json:
+    def _on_take(self, ask: Ask) -> Json:
         return self._done(ask, Document.take_disk)
 
 
-class _Row:
-    """A row of cells that a page sent; None leaves a cell as it is."""
-
-    def __init__(self, fields: CheckedFields) -> None:
-        """Args: fields: With a list `cells` of tables with a `text`, or without one."""
-        self.texts = [
-            each.text("text") if "text" in each.value else None
-            for each in fields.each("cells", cells.MOST_CELLS)
-        ]
+def _row(fields: CheckedFields) -> list[str | None]:
+    """Return a row of cells that a page sent, a `text` each; None, for one without, leaves a cell as it is."""
+    sent = fields.each("cells", cells.MOST_CELLS)
+    return [each.text("text") if "text" in each.value else None for each in sent]
 
 
-def _edit(file: str, lines: Lines, given: CheckedFields) -> Edit:
+def _edit_of(file: str, lines: Lines, given: CheckedFields) -> Edit:
     def place(key: str) -> Place:
         at = Place(given.whole(f"{key}_line", 0, MOST_LINES), given.whole(f"{key}_column", 0, MOST_LINES))
         return lines.place(lines.offset(at, Units.UTF_16))
@@ -257,11 +244,9 @@ def _over_default(text: str, table: str, line: int, column: int, rows: Sequence[
 
 def _lines_of(text: str, table: str) -> tuple[int, int]:
     """Return the number of a table's lines, and 1 if the last is DEFAULT, else 0."""
-    from rcsc.lang.written.tables import table_of
-
     found = table_of(text, table)
-    sheet = None if found is None else cells.sheet_of(found)
-    if sheet is None:
+    if found is None:
         raise Refused(Code.STUDIO, f"the text has no table `{table}`")
+    sheet = cells.sheet_of(found)
     last: Sequence[str] = sheet.cells[-1] if sheet.cells else ()
     return len(sheet.stubs), int(bool(last) and last[0].startswith("DEFAULT"))

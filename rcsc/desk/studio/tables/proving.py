@@ -15,9 +15,9 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.desk.editor.lenses import run_at
 from rcsc.desk.editor.values import Repair
 from rcsc.desk.editor.workspace import Workspace
-from rcsc.desk.studio.hub import PROVER, Ask, Concern, Handler, Json
+from rcsc.desk.studio.hub import PROVER, Ask, Concern, Json
 from rcsc.desk.studio.tables import cells, shown
-from rcsc.desk.studio.tables.desk import PROOF, Desk
+from rcsc.desk.studio.tables.desk import PROOF, Desk, seen
 from rcsc.desk.studio.tables.document import Document
 from rcsc.lang.model import Expr, Program, Table, Value, spell
 from rcsc.lang.project import load
@@ -50,24 +50,14 @@ class Proof(Concern):
         """Args: desk: The open files."""
         self._desk = desk
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "proof.repairs": self._repairs,
-            "proof.repair": self._repair,
-            "proof.run": self._run,
-            "proof.filter": self._filter,
-        }
-
     def _offered(self, ask: Ask) -> tuple[str, int, tuple[Repair, ...]]:
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
         return name, version, self._desk.repairs(name, version, ask.body.whole("finding", 0, 1_000_000))
 
-    def _repairs(self, ask: Ask) -> Json:
+    def _on_repairs(self, ask: Ask) -> Json:
         return [shown.repair(at, each) for at, each in enumerate(self._offered(ask)[2])]
 
-    def _repair(self, ask: Ask) -> Json:
+    def _on_repair(self, ask: Ask) -> Json:
         """Make an offered repair, if the texts are as they were when it was checked."""
         name, version, offered = self._offered(ask)
         at = ask.body.whole("repair", 0, 1_000_000)
@@ -85,9 +75,9 @@ class Proof(Concern):
 
         return self._desk.change(file, make)
 
-    def _run(self, ask: Ask) -> Json:
+    def _on_run(self, ask: Ask) -> Json:
         """Run one cycle of a table in the interpreter, for an input that shows a finding: nothing need be proved or compiled for it."""
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
         number, at = ask.body.whole("finding", 0, 1_000_000), ask.body.whole("input", 0, 1_000_000)
         findings = self._desk.known(name, version).answer.findings
         if number >= len(findings) or at >= len(findings[number].witnesses):
@@ -97,9 +87,9 @@ class Proof(Concern):
         _, comes, *lines = run_at(program, table, witness.values)
         return {"comes": comes, "lines": lines}
 
-    def _filter(self, ask: Ask) -> Json:
+    def _on_filter(self, ask: Ask) -> Json:
         """Report the lines of a table that can match where a condition holds."""
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
         condition = " ".join(ask.body.text("condition").split())
         if not condition or len(condition) > LONGEST_CONDITION:
             raise Refused(
@@ -145,14 +135,9 @@ class Graphs(Concern):
         self._desk = desk
         self._kept: dict[tuple[str, int, str, str], tuple[Program, Derived, Chart]] = {}
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {"graph.show": self._show, "graph.draw": self._draw}
-
-    def _show(self, ask: Ask) -> Json:
+    def _on_show(self, ask: Ask) -> Json:
         """Lay out the graph of a table, some of its composite states shut."""
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
         derived, chart = self._derived(ask, name, version, ask.body.text("table"))
         names = [each.name for each in chart.composites]
         shut = [each.text("name") for each in ask.body.each("shut", MOST_SHUT, ())]
@@ -194,9 +179,9 @@ class Graphs(Concern):
                 del self._kept[old]
         return self._kept[key][1:]
 
-    def _draw(self, ask: Ask) -> Json:
+    def _on_draw(self, ask: Ask) -> Json:
         """Add a line that leads from a state to another; return its name and its place."""
-        name, version = ask.body.text("file"), ask.body.whole("version", 1, 2**53)
+        name, version = seen(ask)
         table_name = ask.body.text("table")
         derived, _ = self._derived(ask, name, version, table_name)
         source, target = ask.body.text("source"), ask.body.text("target")

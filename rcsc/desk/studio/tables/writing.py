@@ -5,7 +5,6 @@ Nothing is proved for them. They have a lane and a reading of the files of their
 """
 
 import os
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rcsc.desk.editor.grid import grids
@@ -17,8 +16,8 @@ from rcsc.desk.editor.names.tokens import TYPES, tokens
 from rcsc.desk.editor.places import Lines, Place, Units
 from rcsc.desk.editor.values import BEING_PROVED
 from rcsc.desk.editor.workspace import Workspace
-from rcsc.desk.studio.hub import Ask, Concern, Handler, Json
-from rcsc.desk.studio.tables.desk import Desk
+from rcsc.desk.studio.hub import Ask, Concern, Json
+from rcsc.desk.studio.tables.desk import Desk, seen
 from rcsc.desk.studio.tables.editing import MOST_LINES
 
 if TYPE_CHECKING:
@@ -35,25 +34,13 @@ class Writing(Concern):
         self._desk = desk
         self._workspace = Workspace()
 
-    @property
-    def handlers(self) -> Mapping[str, Handler]:
-        """The handlers by kind."""
-        return {
-            "text.offers": self._offers,
-            "text.about": self._about,
-            "text.declared": self._declared,
-            "text.colours": self._colours,
-        }
-
     def _names(self, ask: Ask) -> tuple[Names, str]:
         """Return the names of a file as a page has seen it, with all that it uses, and its path.
 
         Raises:
             Refused: The text has changed.
         """
-        path = os.path.normpath(
-            self._desk.at(ask.body.text("file"), ask.body.whole("version", 1, 2**53)).file
-        )
+        path = os.path.normpath(self._desk.at(*seen(ask)).file)
         texts = self._desk.texts()
         for gone in self._workspace.overlay.keys() - texts.keys():
             self._workspace.close(gone)
@@ -68,7 +55,7 @@ class Writing(Concern):
         place = Place(ask.body.whole("line", 0, MOST_LINES), ask.body.whole("column", 0, MOST_LINES))
         return names, path, Lines(names.sources[path].text).offset(place, Units.UTF_16)
 
-    def _offers(self, ask: Ask) -> Json:
+    def _on_offers(self, ask: Ask) -> Json:
         """Return the completions at a place."""
         names, path, offset = self._at(ask)
         made = grids(path, Lines(names.sources[path].text), names.program, lambda _: BEING_PROVED)
@@ -77,7 +64,7 @@ class Writing(Concern):
             {"label": each.label, "kind": each.kind, "detail": each.detail, "doc": each.doc} for each in found
         ]
 
-    def _about(self, ask: Ask) -> Json:
+    def _on_about(self, ask: Ask) -> Json:
         """Describe the name at a place, in Markdown, with the name's area; null for no name."""
         names, path, offset = self._at(ask)
         name = names.at(path, offset)
@@ -87,7 +74,7 @@ class Writing(Concern):
         known: dict[str, Grid] = {} if answer is None else {each.name: each for each in answer.tables}
         return {"text": about(names, name, known), **_area(names, name)}
 
-    def _declared(self, ask: Ask) -> Json:
+    def _on_declared(self, ask: Ask) -> Json:
         """Return the declaration of the name at a place; null where there is none."""
         names, path, offset = self._at(ask)
         name = names.at(path, offset)
@@ -99,7 +86,7 @@ class Writing(Concern):
         found = next(iter(names.declarations(name)), None)
         return None if found is None else {"file": self._desk.named(found.span.file), **_area(names, found)}
 
-    def _colours(self, ask: Ask) -> Json:
+    def _on_colours(self, ask: Ask) -> Json:
         """Return the token of each word of a text: line, column, length and type, one after another."""
         names, path = self._names(ask)
         lines, numbers = Lines(names.sources[path].text), list[int]()
