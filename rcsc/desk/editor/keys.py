@@ -17,10 +17,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.lang.syntax.rows import stub_of
-from rcsc.lang.written.changes import spliced
+from rcsc.lang.written.changes import Splice, spliced
 from rcsc.lang.written.tables import RowText, WrittenTable, dashes, fresh_name, joined_cells, tables_of
-
-Splice: TypeAlias = tuple[int, int, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ def _aligned(rows: Sequence[RowText]) -> Iterator[Splice]:
 
 def align(text: str, offset: int) -> list[Splice]:
     """Return the splices that align the table around an offset, without those that change nothing."""
-    table = _table(text, offset)
+    table = next((table for table in tables_of(text) if table.start <= offset <= table.end), None)
     found = [] if table is None else aligned(table)
     return [(start, end, new) for start, end, new in found if text[start:end] != new]
 
@@ -174,14 +172,16 @@ def add_row(text: str, offset: int) -> Moved | None:
         if at >= 0 and at < len(part.lines):
             after = part.lines[at][-1]
         else:
-            after = here.table.rows_of(part)[-1] if not part.lines else _before(here.table, part.lines[0][0])
+            rows = here.table.rows
+            after = rows[rows.index(part.lines[0][0]) - 1] if part.lines else here.table.rows_of(part)[-1]
         cells = regions(part.heading[0])
         indent = text[text.rfind("\n", 0, after.start) + 1 : after.start]
         left = " | ".join([name, *("" for each in cells[1:] if not each.action)])
         row = f"| {left} ||{''.join('  |' for each in cells if each.action)}"
         splices.append((after.past, after.past, f"{end}{indent}{row}"))
         if any(around in line for line in part.lines) or around in here.table.rows_of(part):
-            wanted = here.table.rows.index(after) + 1 + _further(here.table, splices[:-1], after.past)
+            added = sum(start < after.past for start, _, _ in splices[:-1])
+            wanted = here.table.rows.index(after) + 1 + added
     text = spliced(text, splices)
     table = here.again(text)
     text = spliced(text, aligned(table))
@@ -239,20 +239,6 @@ class _Here:
     def again(self, text: str) -> WrittenTable:
         """Return the table in a changed text."""
         return list(tables_of(text))[self.number]
-
-
-def _table(text: str, offset: int) -> WrittenTable | None:
-    return next((table for table in tables_of(text) if table.start <= offset <= table.end), None)
-
-
-def _before(table: WrittenTable, row: RowText) -> RowText:
-    return table.rows[table.rows.index(row) - 1]
-
-
-def _further(table: WrittenTable, splices: Sequence[Splice], past: int) -> int:
-    """Count the rows added before an offset."""
-    assert table.rows
-    return sum(start < past for start, _, _ in splices)
 
 
 def _cursor(row: RowText, cell: int) -> int:

@@ -117,12 +117,6 @@ class Lines:
             text = text[: self.offset(edit.area.start)] + edit.text + text[self.offset(edit.area.end) :]
         return text
 
-    @property
-    def end(self) -> str:
-        """The line end of the text: that of its first line."""
-        first = _END.search(self.text)
-        return "\n" if first is None else first[0]
-
 
 def _characters(line: str, column: int, units: Units) -> int:
     """Count the characters of a line before a column; a column within a character is before it."""

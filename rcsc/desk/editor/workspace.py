@@ -395,16 +395,13 @@ class Workspace:
             after = trial.checked(checked.reading.path)
         before = {key(each) for each in serious(checked.diagnostics)}
         now = {key(each) for each in serious(after.diagnostics)}
-        gone = key(told) not in now or (told.code in COUNTED and told.message not in _messages(after))
+        messages = {each.message for each in after.diagnostics}
+        gone = key(told) not in now or (told.code in COUNTED and told.message not in messages)
         if after.reading.program is None or not gone or now - before:
             return None
         table = told.proposals[0].table
         wrong = any(table in _names_in(after.reading.loaded, each) for each in serious(after.diagnostics))
         return not wrong
-
-
-def _messages(checked: Checked) -> set[str]:
-    return {each.message for each in checked.diagnostics}
 
 
 def _inside(span: Span, wholes: Iterable[Span]) -> bool:

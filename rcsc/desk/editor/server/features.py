@@ -5,8 +5,9 @@ In: requests. Out: the protocol's answers; no proof is waited for but by hover, 
 
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
@@ -72,25 +73,13 @@ def register(server: LanguageServer, session: Session) -> None:
 
 
 def _names(server: LanguageServer, session: Session) -> None:
-    @server.feature(types.TEXT_DOCUMENT_HOVER)
-    async def hover(params: types.HoverParams) -> types.Hover | None:
-        return await session.reading(_hover, session, params)
-
-    @server.feature(types.TEXT_DOCUMENT_DEFINITION)
-    async def definition(params: types.DefinitionParams) -> list[types.Location]:
-        return await session.reading(_definition, session, params)
-
-    @server.feature(types.TEXT_DOCUMENT_REFERENCES)
-    async def references(params: types.ReferenceParams) -> list[types.Location]:
-        return await session.reading(_references, session, params)
-
-    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT)
-    async def highlight(params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
-        return await session.reading(_highlights, session, params)
-
-    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
-    async def prepare(params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
-        return await session.reading(_prepare, session, params)
+    for kind, answer in (
+        (types.TEXT_DOCUMENT_HOVER, _hover), (types.TEXT_DOCUMENT_DEFINITION, _definition),
+        (types.TEXT_DOCUMENT_REFERENCES, _references), (types.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT, _highlights),
+        (types.TEXT_DOCUMENT_PREPARE_RENAME, _prepare), (types.TEXT_DOCUMENT_DOCUMENT_SYMBOL, _symbols),
+        (types.WORKSPACE_SYMBOL, _everywhere),
+    ):  # fmt: skip
+        _read(server, session, kind, answer)
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     @current
@@ -100,13 +89,19 @@ def _names(server: LanguageServer, session: Session) -> None:
             server.window_show_message(types.ShowMessageParams(types.MessageType.Warning, told))
         return edit
 
-    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
-    async def symbols(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        return await session.reading(_symbols, session, session.path(params.text_document.uri))
 
-    @server.feature(types.WORKSPACE_SYMBOL)
-    async def everywhere(params: types.WorkspaceSymbolParams) -> list[types.WorkspaceSymbol]:
-        return await session.reading(_everywhere, session, params.query)
+def _read(
+    server: LanguageServer,
+    session: Session,
+    kind: str,
+    answer: Callable[[Session, Any], object],
+    options: Any = None,
+) -> None:
+    """Register an answer that needs no proof."""
+
+    @server.feature(kind, options)
+    async def asked(params: Any) -> object:
+        return await session.reading(answer, session, params)
 
 
 def _here(
@@ -281,7 +276,8 @@ def _words_in(path: str) -> set[str]:
 # --- symbols -----------------------------------------------------------------------
 
 
-def _symbols(session: Session, path: str) -> list[types.DocumentSymbol]:
+def _symbols(session: Session, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+    path = session.path(params.text_document.uri)
     text = session.workspace.text(path)
     converter = session.converter({path: text})
     return list(_declared(converter, Source(path, text)))
@@ -312,7 +308,7 @@ def _declared(converter: Converter, source: Source) -> Iterator[types.DocumentSy
         )
 
 
-def _everywhere(session: Session, query: str) -> list[types.WorkspaceSymbol]:
+def _everywhere(session: Session, params: types.WorkspaceSymbolParams) -> list[types.WorkspaceSymbol]:
     """Return symbols of the open projects whose names hold the letters of the query in order."""
     files = {file for path in session.uris for file in session.workspace.project(path)}
     found = []
@@ -321,7 +317,7 @@ def _everywhere(session: Session, query: str) -> list[types.WorkspaceSymbol]:
         converter = session.converter({file: source.text})
         for word, name, _, named in declarations(source):
             letters = iter(name.lower())
-            if all(letter in letters for letter in query.lower()):
+            if all(letter in letters for letter in params.query.lower()):
                 kind = _SYMBOLS.get(word, types.SymbolKind.Variable)
                 found.append(
                     types.WorkspaceSymbol(
@@ -335,17 +331,10 @@ def _everywhere(session: Session, query: str) -> list[types.WorkspaceSymbol]:
 
 
 def _writing(server: LanguageServer, session: Session) -> None:
-    @server.feature(
-        types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=[".", "|", ":", "="])
-    )
-    async def completion(params: types.CompletionParams) -> types.CompletionList:
-        return await session.reading(_completion, session, params)
-
+    triggers = types.CompletionOptions(trigger_characters=[".", "|", ":", "="])
+    _read(server, session, types.TEXT_DOCUMENT_COMPLETION, _completion, triggers)
     legend = types.SemanticTokensLegend(list(TYPES), list(MODIFIERS))
-
-    @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, legend)
-    async def colours(params: types.SemanticTokensParams) -> types.SemanticTokens:
-        return await session.reading(_colours, session, session.path(params.text_document.uri))
+    _read(server, session, types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, _colours, legend)
 
 
 def _completion(session: Session, params: types.CompletionParams) -> types.CompletionList:
@@ -367,7 +356,8 @@ def _item(number: int, offer: Offer) -> types.CompletionItem:
     )
 
 
-def _colours(session: Session, path: str) -> types.SemanticTokens:
+def _colours(session: Session, params: types.SemanticTokensParams) -> types.SemanticTokens:
+    path = session.path(params.text_document.uri)
     names = session.names(path)
     if path not in names.sources:
         return types.SemanticTokens([])

@@ -33,11 +33,6 @@ def register(server: LanguageServer, session: Session) -> None:
     _lenses(server, session)
 
 
-def converter_of(session: Session, answer: Answer) -> Converter:
-    """Return a converter of places in all texts that an answer points into."""
-    return session.converter(answer.texts)
-
-
 def by_file(answer: Answer) -> dict[str, list[Finding]]:
     """Return the findings of each file; the file itself is there even without any."""
     found: dict[str, list[Finding]] = {answer.file: []}
@@ -67,7 +62,7 @@ def _pulled(server: LanguageServer, session: Session) -> None:
         known = session.result_of(answer)
         if params.previous_result_id == known:
             return types.RelatedUnchangedDocumentDiagnosticReport(known)
-        converter = converter_of(session, answer)
+        converter = session.converter(answer.texts)
         found = by_file(answer)
         items = [converter.diagnostic(each) for each in found.pop(path)]
         related = {
@@ -93,7 +88,7 @@ def _actions(server: LanguageServer, session: Session) -> None:
     async def actions(params: types.CodeActionParams) -> list[types.CodeAction]:
         path = session.path(params.text_document.uri)
         answer = await session.final(path)
-        converter = converter_of(session, answer)
+        converter = session.converter(answer.texts)
         only = params.context.only
         found: list[types.CodeAction] = []
         if only is None or any(
@@ -155,14 +150,14 @@ def _lenses(server: LanguageServer, session: Session) -> None:
     async def lenses(params: types.CodeLensParams) -> list[types.CodeLens]:
         uri = params.text_document.uri
         answer = await session.answer(session.path(uri))
-        converter = converter_of(session, answer)
+        converter = session.converter(answer.texts)
         return [lens for grid in answer.tables for lens in _of_table(converter, answer, grid, uri)]
 
     @server.feature(types.TEXT_DOCUMENT_INLAY_HINT)
     @current
     async def hints(params: types.InlayHintParams) -> list[types.InlayHint]:
         answer = await session.answer(session.path(params.text_document.uri))
-        return list(_shares(converter_of(session, answer), answer, params.range))
+        return list(_shares(session.converter(answer.texts), answer, params.range))
 
     @server.command("rcsc.prove")
     @current
@@ -235,7 +230,7 @@ def _show(server: LanguageServer, session: Session, shown: Shown) -> dict[str, o
 
 def status_of(session: Session, answer: Answer) -> dict[str, object]:
     """Return the standing of each table of a file, as lenses and hovers show it."""
-    converter = converter_of(session, answer)
+    converter = session.converter(answer.texts)
     return {
         "uri": converter.uri(answer.file),
         "version": session.versions.get(answer.file),

@@ -17,7 +17,7 @@ from rcsc.base.host.memory import settled
 from rcsc.desk.editor.places import Units
 from rcsc.desk.editor.server import features, findings
 from rcsc.desk.editor.server.convert import reads_messages
-from rcsc.desk.editor.server.findings import by_file, converter_of, status_of
+from rcsc.desk.editor.server.findings import by_file, status_of
 from rcsc.desk.editor.server.session import Session
 from rcsc.desk.editor.values import Answer
 from rcsc.lang.syntax.parse import ready
@@ -69,7 +69,7 @@ class Server(LanguageServer):
 
     def _push(self, answer: Answer) -> None:
         """Send the findings of a file and of those that it uses; clear those of files that have none any more."""
-        converter = converter_of(self.session, answer)
+        converter = self.session.converter(answer.texts)
         found = {
             file: each
             for file, each in by_file(answer).items()
