@@ -31,7 +31,7 @@ from rcsc.run.log.schema import fingerprints
 from rcsc.run.log.states import begun_in_words
 from rcsc.run.orders.operator import line_to
 from rcsc.run.orders.roles import Served, served
-from rcsc.run.signature import Leaf, Signature, Value, Values
+from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 
 if TYPE_CHECKING:
@@ -300,14 +300,10 @@ class Session:
         """Return whether a condition reads a report whose number is not the last order's, and does not look at that itself."""
         for to in served(self.system.description, {level.name: level.sign for level in self.levels}):
             level, order = self.system.level(to.level), self.memory.latest(to.order)
-            echo, *others = (level.sign.index[leaf.name] for leaf in _echo_first(to))
-            read = {at for name, at in what.leaves if name == to.level}
-            if (
-                order is not None
-                and order[to.number] != level.values[echo]
-                and echo not in read
-                and read & set(others)
-            ):
+            places = [level.sign.index[leaf.name] for leaf in to.report_leaves]
+            echo, read = places[to.echo], {at for name, at in what.leaves if name == to.level}
+            late = order is not None and order[to.number] != level.values[echo]
+            if late and echo not in read and not read.isdisjoint(places):
                 return True
         return False
 
@@ -477,17 +473,9 @@ class Session:
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]
         if judged.doubts and not anyway:
-            raise Refused(
-                Code.SHELL_OTHERWISE,
-                "\n".join(
-                    (
-                        f"level `{name}` keeps its tables: {judged.doubts[0]}",
-                        *judged.doubts[1:],
-                        *judged.notes,
-                    )
-                ),
-                f"`reload {name} anyway` takes them",
-            )
+            why = "\n".join((*judged.doubts, *judged.notes))
+            message = f"level `{name}` keeps its tables: {why}"
+            raise Refused(Code.SHELL_OTHERWISE, message, f"`reload {name} anyway` takes them")
         self._keep()
         self._forget_hand(name)
         self._programs[id(reloaded.level)] = reloaded.level, reloaded.program
@@ -522,25 +510,23 @@ class Session:
             level.name: reloaded.sources if level is old else self._builds[id(level)][2]
             for level in self.levels
         }
-        known = together(self.plant, name, runs, self._compiled, prove=prove)
+        known = together(
+            self.plant,
+            name,
+            runs,
+            lambda name: self._meaning(self.system.level(name)) is not None,
+            prove=prove,
+        )
         if spent():
             raise Refused(Code.SHELL_RELOAD, f"level `{name}` keeps its tables: their proof was given up")
         return old, reloaded, replace(judged, notes=(*judged.notes, known))
 
     def _meaning(self, level: RunningLevel) -> Program | None:
-        """Return the program of a level's tables; None where their sources are not known."""
+        """Return the program of a level's tables; None where its executors are not made of the sources that are known."""
         try:
             return self.program(level)
         except Refused:
             return None
-
-    def _compiled(self, name: str) -> bool:
-        """Return whether a level's executors were made of the sources that were there when it began to run."""
-        try:
-            self.program(self.system.level(name))
-        except Refused:
-            return False
-        return True
 
     def _forget(self) -> None:
         self._past.pop()
@@ -549,11 +535,6 @@ class Session:
     def _keep(self) -> None:
         self.changes += 1
         self._past.append(history.kept(self.system, self.memory, self._answers, self.faults))
-
-
-def _echo_first(to: Served) -> tuple[Leaf, ...]:
-    """The fields of a report, that with the number of the order first."""
-    return (to.report_leaves[to.echo], *(leaf for at, leaf in enumerate(to.report_leaves) if at != to.echo))
 
 
 def _with(values: Values, at: int, value: Value) -> Values:
@@ -603,9 +584,6 @@ def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[
                 run = signs[spec.name].record(feed.into)
             except KeyError as error:
                 raise BadDescription(f"level `{spec.name}` has no variable `{feed.into}` to fill") from error
-            queries[feed.query] = _silent(tuple(signs[spec.name].leaves[at].initial for at in run))
+            answer = tuple(signs[spec.name].leaves[at].initial for at in run)
+            queries[feed.query] = lambda *_, answer=answer: answer
     return queries
-
-
-def _silent(answer: Values) -> Query:
-    return lambda *_: answer
