@@ -162,6 +162,12 @@ class WitnessColumn:
     inputs: int | None = None
     effects: Effects | None = None
 
+    @property
+    def said(self) -> str:
+        """The input in words: `cmd = 1, width_mm = 41`."""
+        values = zip(self.variables, self.values, strict=True)
+        return ", ".join(f"{name} = {value}" for name, value in values)
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:

@@ -78,8 +78,7 @@ def with_witness(diagnostic: Diagnostic, sources: Sources) -> str:
     """Return the one line, and below it each witness that a text shows: its values, its region, and the number of others."""
     lines = [one_line(diagnostic, sources)]
     for witness in diagnostic.shown:
-        values = (f"{name} = {value}" for name, value in zip(witness.variables, witness.values, strict=True))
-        lines.append(f"  witness: {escape(', '.join(values))}")
+        lines.append(f"  witness: {escape(witness.said)}")
         if witness.region:
             lines.append(f"  region: {escape(region(witness))}")
     if diagnostic.left_out:
@@ -205,23 +204,20 @@ def _marks(
 
 
 def _attached(gutter: int, word: str, text: str, style: Style) -> Row:
+    """Return a row below a finding; line ends of its text are kept, and the lines after them are indented."""
+    hanging = f"\n{' ' * (gutter + len(word) + 5)}".join(escape(line) for line in text.splitlines())
     return (
         TextPiece(f"{' ' * gutter} = ", Style.GUTTER),
         TextPiece(word, style),
-        TextPiece(f": {_hanging(text, gutter + len(word) + 5)}"),
+        TextPiece(f": {hanging}"),
     )
-
-
-def _hanging(text: str, indent: int) -> str:
-    """Return escaped text; its own line ends are kept, and the lines after them are indented."""
-    return f"\n{' ' * indent}".join(escape(line) for line in text.splitlines())
 
 
 def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
     """Yield a small table, one row for each variable, with the witness beside the lines that match it."""
     heads = ("input", "witness", *(f"line {line.name}" for line in witness.lines))
     columns = [heads] + [
-        (name, value, *(_cell(line.cells, row) for line in witness.lines))
+        (name, value, *(line.cells[row] if row < len(line.cells) else "" for line in witness.lines))
         for row, (name, value) in enumerate(zip(witness.variables, witness.values, strict=True))
     ]
     cells = [tuple(escape(cell) for cell in row) for row in columns]
@@ -250,10 +246,6 @@ def region(witness: WitnessColumn) -> str:
     """Return the maximal region around the witness, in the table's words."""
     free = len(witness.variables) > len(witness.region)
     return ", ".join((*witness.region, "any other") if free else witness.region)
-
-
-def _cell(cells: tuple[str, ...], row: int) -> str:
-    return cells[row] if row < len(cells) else ""
 
 
 def _joined(cells: Iterable[str], widths: Iterable[int]) -> str:

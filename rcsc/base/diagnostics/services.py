@@ -169,8 +169,7 @@ def annotation(diagnostic: Diagnostic, sources: Sources) -> str:
 def _body(diagnostic: Diagnostic) -> str:
     lines = [escape(diagnostic.message)]
     for witness in diagnostic.shown:
-        values = zip(witness.variables, witness.values, strict=True)
-        lines.append("input: " + escape(", ".join(f"{name} = {value}" for name, value in values)))
+        lines.append("input: " + escape(witness.said))
         if witness.region:
             lines.append("region: " + escape(region(witness)))
     if diagnostic.left_out:
