@@ -28,7 +28,6 @@ def told(command: Callable[..., int]) -> Callable[..., int]:
 
     @wraps(command)
     def wrapped(file: Path, **kwargs: Any) -> int:
-
         try:
             return command(file=file, **kwargs)
         except UnreadableLog as error:

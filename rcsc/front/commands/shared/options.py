@@ -87,7 +87,6 @@ def proving(command: Command) -> Command:
         no_cache: bool,
         **kwargs: Any,
     ) -> int:
-
         options = Options(
             steps=steps,
             memory_mb=memory,

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -32,7 +32,6 @@ from rcsc.base.diagnostics.report import (
     NOT_PROVED,
     InSystem,
     Report,
-    SystemReport,
     TableReport,
     Verdict,
     named,
@@ -96,7 +95,19 @@ def show(report: Report, command: str, output: Output, closing: str = "") -> Non
         UnwritableError: The file, or standard output, could not be written.
         BrokenPipeError: Whoever read standard output has gone.
     """
-    put(_FORMS[output.form](report, command, output, closing), output.file)
+    match output.form:
+        case OutputForm.TEXT:
+            text = _text(report, output, closing)
+        case OutputForm.LINE:
+            told = _told(report, output)
+            text = "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in told)
+        case OutputForm.JSON:
+            text = json_text(report_to_json(report, command))
+        case OutputForm.SARIF:
+            text = json_text(sarif(report))
+        case OutputForm.GITHUB:
+            text = annotations(report)
+    put(text, output.file)
 
 
 def put(text: str, file: Path | None) -> None:
@@ -134,29 +145,10 @@ def finish(report: Report, command: str, output: Output, closing: str = "") -> i
     return 1 if report.failed else 0
 
 
-def _json(report: Report, command: str, _output: Output, _closing: str) -> str:
-
-    return json_text(report_to_json(report, command))
-
-
-def _sarif(report: Report, _command: str, _output: Output, _closing: str) -> str:
-
-    return json_text(sarif(report))
-
-
 def json_text(value: object) -> str:
     r"""Write a value as JSON in UTF-8; a byte of a file's name that is not UTF-8 is escaped, as `\udcff`."""
     text = json.dumps(value, indent=2, ensure_ascii=False) + "\n"
     return text.encode(errors="backslashreplace").decode()
-
-
-def _github(report: Report, _command: str, _output: Output, _closing: str) -> str:
-
-    return annotations(report)
-
-
-def _lines(report: Report, _command: str, output: Output, _closing: str) -> str:
-    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in _told(report, output))
 
 
 def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
@@ -166,7 +158,7 @@ def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
             yield diagnostic
 
 
-def _text(report: Report, _command: str, output: Output, closing: str) -> str:
+def _text(report: Report, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
     columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else WIDEST_LINE
     rows: list[Row] = []
@@ -177,15 +169,6 @@ def _text(report: Report, _command: str, output: Output, closing: str) -> str:
         if closing:
             rows.append((TextPiece(closing, Style.STRONG),))
     return paint(rows) if coloured else plain(rows)
-
-
-_FORMS: dict[OutputForm, Callable[[Report, str, Output, str], str]] = {
-    OutputForm.TEXT: _text,
-    OutputForm.LINE: _lines,
-    OutputForm.JSON: _json,
-    OutputForm.SARIF: _sarif,
-    OutputForm.GITHUB: _github,
-}
 
 
 def _is_terminal(handle: int) -> bool:
@@ -219,10 +202,13 @@ def summary(report: Report) -> Iterator[Row]:
                 TextPiece(f"  {backing(table)}"),
             )
     for system in report.systems:
+        name = escape(system.system)
         if system.wanted:
-            yield (TextPiece(_of_system(system), Style.NOTE),)
+            told = f"the assumptions of these tables are not proved of the levels together: `rcsc prove {name}` decides them"
+            yield (TextPiece(told, Style.NOTE),)
         elif system.missing:
-            yield (TextPiece(_missing(system), Style.NOTE),)
+            told = f"{name} is {system.standing}: {escape(named(system.missing))}"
+            yield (TextPiece(told, Style.NOTE),)
     if report.tables or report.diagnostics:
         yield tuple(_counts(report))
 
@@ -250,15 +236,10 @@ def backing(table: TableReport) -> str:
 
 def _assumed(table: TableReport) -> Iterator[str]:
     """Yield each assumption with its state."""
-    together = table.together
-    remarks = (
-        {} if together is None else dict.fromkeys(together.not_proved, ", not proved of the levels together")
-    )
-    remarks |= (
-        {}
-        if together is None
-        else dict.fromkeys(together.conditional, ", conditional of the levels together")
-    )
+    remarks: dict[str, str] = {}
+    if (together := table.together) is not None:
+        remarks |= dict.fromkeys(together.not_proved, ", not proved of the levels together")
+        remarks |= dict.fromkeys(together.conditional, ", conditional of the levels together")
     for name, standing in table.assumptions:
         yield f"{escape(name)} ({standing}{remarks.get(name, '')})"
 
@@ -274,15 +255,6 @@ def _together(known: InSystem) -> Iterator[str]:
         noun = "line" if len(known.unreached) == 1 else "lines"
         lines = ", ".join(map(escape, known.unreached))
         yield f"{noun} {lines} never reached in {system}{'' if known.proved else escape(trusting(known.trusts))}"
-
-
-def _of_system(system: SystemReport) -> str:
-    command = f"`rcsc prove {escape(system.system)}`"
-    return f"the assumptions of these tables are not proved of the levels together: {command} decides them"
-
-
-def _missing(system: SystemReport) -> str:
-    return f"{escape(system.system)} is {system.standing}: {escape(named(system.missing))}"
 
 
 def _counts(report: Report) -> Iterator[TextPiece]:

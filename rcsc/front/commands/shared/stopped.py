@@ -19,6 +19,16 @@ if TYPE_CHECKING:
 _P = ParamSpec("_P")
 
 
+def say_error(code: Code, text: str, severity: str = "error") -> None:
+    """Print a finding of one line on standard error."""
+    click.echo(f"{severity}[{code.value}]: {text}", err=True)
+
+
+def attach(word: str, text: object) -> None:
+    """Print a line that belongs to the finding above: a `note`, a `help`, a `log`."""
+    click.echo(f"  = {word}: {text}", err=True)
+
+
 class Stopped(click.ClickException):  # what happened
     """A coded error of a run; exit status 1."""
 
@@ -31,9 +41,9 @@ class Stopped(click.ClickException):  # what happened
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
         """Print the error in the form of all others."""
         for line in self.message.splitlines():
-            click.echo(f"error[{self.code.value}]: {line}", err=True)
+            say_error(self.code, line)
         for text in self.helps:
-            click.echo(f"  = help: {text}", err=True)
+            attach("help", text)
 
 
 class StoppedByFile(Stopped):

@@ -17,6 +17,7 @@ from rcsc.base.host.cache import open_cache
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.options import cores
 from rcsc.front.commands.shared.show import Progress, put, writing
+from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.shared.systems import COMPILES, SYSTEM, made, meant, system_path
 from rcsc.run.campaign.choose import kind_of, plant_name, plant_of
 from rcsc.run.campaign.counterexamples import (
@@ -116,8 +117,11 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     )
     if again is not None:
         return _again(again, rig, executor)
-    pool = _pool(scheduler, workers or cores())
-    return _campaign(asked, seed, episodes, pool, _journal(rig, seed, journal))
+    pool = processes(workers or cores()) if scheduler is None else cluster(scheduler)
+    place = journal or journal_path(rig, seed, path.resolve().parent / ".rcsc-cache")
+    with writing(place):
+        kept = Journal(place, header(rig, seed))
+    return _campaign(asked, seed, episodes, pool, kept)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,18 +170,6 @@ def _claims(rig: Rig[Any], *, wanted: bool, compiles: bool) -> Claims:
     from rcsc.driver.watched import claims_of  # proves
 
     return claims_of(rig.system, open_cache(rig.system.parent))
-
-
-def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerPool]:
-
-    return processes(workers) if scheduler is None else cluster(scheduler)
-
-
-def _journal(rig: Rig[Any], seed: int, path: Path | None) -> Journal:
-
-    place = path or journal_path(rig, seed, rig.system.parent / ".rcsc-cache")
-    with writing(place):
-        return Journal(place, header(rig, seed))
 
 
 def _campaign(  # as many as there are options
@@ -312,18 +304,18 @@ def _show(asked: CampaignOptions, index: int, counterexample: Shrunk[Any], place
     finding, happens = counterexample.finding, asked.rig.kind.told(counterexample.episode)
     _tell(f"episode {index}", finding, happens)
     if counterexample.log:
-        click.echo(f"  = help: {asked.replays} {shlex.quote(str(place / 'log.mcap'))}", err=True)
-    click.echo(f"  = help: {asked.again} {shlex.quote(str(place))}", err=True)
+        attach("help", f"{asked.replays} {shlex.quote(str(place / 'log.mcap'))}")
+    attach("help", f"{asked.again} {shlex.quote(str(place))}")
 
 
 def _tell(where: str, finding: EpisodeFinding, happens: Sequence[str]) -> None:
     """Print what does not hold, and the events of the episode that shows it."""
-    click.echo(
-        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {finding.tick}: `{finding.property}` does not hold: {finding.message}",
-        err=True,
+    say_error(
+        Code.PROPERTY_BROKEN,
+        f"{where}, cycle {finding.tick}: `{finding.property}` does not hold: {finding.message}",
     )
     for line in happens:
-        click.echo(f"  = note: {line}", err=True)
+        attach("note", line)
 
 
 def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:

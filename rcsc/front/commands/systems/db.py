@@ -49,7 +49,7 @@ def check(system: Path | None, output: Output) -> int:
     """Check the description and the data file; every fault is named, with its line."""
     try:
         _built(system, None, writes=False)
-        report = _report(None)
+        report = Report(())
     except CodedError as error:
         if output.form is OutputForm.TEXT and output.file is None:
             raise
@@ -61,10 +61,8 @@ def check(system: Path | None, output: Output) -> int:
     return 1 if report.failed else 0
 
 
-def _report(error: CodedError | None) -> Report:
+def _report(error: CodedError) -> Report:
     """Return the errors as a report, for a form that a program reads."""
-    if error is None:
-        return Report(())
     if isinstance(error, BadFile) and error.diagnostics:
         return Report(error.diagnostics, sources=error.sources)
     diagnostics = (

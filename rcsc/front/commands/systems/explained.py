@@ -16,7 +16,8 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, runs_on_executors
-from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
+from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, rows
+from rcsc.front.commands.shared.stopped import attach, say_error
 
 ALIKE = 2
 """Consequences of one kind that are shown with their runs; others differ in a reason only, and are told in a line."""
@@ -36,50 +37,43 @@ def say_explanation(
         f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
     )
     if explanation.bug:
-        click.echo(
-            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {explanation.obligation.shown}",
-            err=True,
+        say_error(
+            Code.NOT_REPRODUCED, f"{where}: the trace found does not run: {explanation.obligation.shown}"
         )
     elif explanation.warns:
-        click.echo(
-            f"warning[{Code.ENDLESS.value}]: {where}: not shown: {explanation.obligation.shown}", err=True
-        )
+        say_error(Code.ENDLESS, f"{where}: not shown: {explanation.obligation.shown}", "warning")
     else:
-        click.echo(
-            f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
-        )
+        say_error(Code.NOT_COMPOSED, f"{where}: not proved: {explanation.obligation.shown}")
     if stated := _stated(systems, explanation):
-        click.echo(f"  = note: it says: {stated}", err=True)
+        attach("note", f"it says: {stated}")
     for line in explanation.beside if not explanation.undefined else ():
-        click.echo(f"  = note: {line}", err=True)
+        attach("note", line)
     if explanation.finding is not None and not explanation.beside:
         _say_finding(systems, explanation)
         _say_consequences(systems, explanation, further)
     elif explanation.undefined:
-        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
+        attach("note", "the run that shows it meets an operation that is not defined")
     elif explanation.guessed:
-        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
+        attach("note", "a trace that was found does not run: arithmetic was left open")
     elif (
         explanation.obligation.sort.value == "assumption"
         and explanation.obligation.name in systems[explanation.level].trusted
     ):
-        click.echo(
-            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
+        attach(
+            "note",
+            "no first cycle can be as the tables declare, or no later one, or none that runs this table: "
             "what rests on it says nothing",
-            err=True,
         )
     elif cycles and not explanation.beside:
-        click.echo(f"  = note: {_no_run(systems[explanation.level], explanation, cycles)}", err=True)
+        attach("note", _no_run(systems[explanation.level], explanation, cycles))
         _say_supposed(systems, explanation)
     _say_notes(explanation, cycles)
     for line in explanation.helps:
-        click.echo(f"  = help: {line}", err=True)
+        attach("help", line)
     if explanation.together:
-        click.echo(f"  = note: {explanation.together}", err=True)
+        attach("note", explanation.together)
     if explanation.others:
-        click.echo(
-            f"  = note: no such run was found of both of lines {', '.join(explanation.others)}", err=True
-        )
+        attach("note", f"no such run was found of both of lines {', '.join(explanation.others)}")
     _say_logs(explanation)
 
 
@@ -96,13 +90,11 @@ def _say_logs(explanation: Explanation) -> None:
     if log is None:
         return
     executor = "" if explanation.in_c else " --executor python"
-    click.echo(f"  = log: rcsc replay {log} --generated {log.parent / 'generated'}{executor}", err=True)
-    click.echo(f"  = picture: rcsc log {log} --report {log.with_suffix('.html')}", err=True)
+    attach("log", f"rcsc replay {log} --generated {log.parent / 'generated'}{executor}")
+    attach("picture", f"rcsc log {log} --report {log.with_suffix('.html')}")
     if explanation.follows:
         then = log.with_name(f"{log.stem}_then_N{log.suffix}")
-        click.echo(
-            f"  = note: the runs of what follows, N from 1 to {len(explanation.follows)}: {then}", err=True
-        )
+        attach("note", f"the runs of what follows, N from 1 to {len(explanation.follows)}: {then}")
 
 
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
@@ -119,12 +111,12 @@ def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -
 def _say_notes(explanation: Explanation, cycles: int) -> None:
     """Print what is known without a run."""
     for note in explanation.notes:
-        click.echo(f"  = note: {note}", err=True)
+        attach("note", note)
     if explanation.notes and explanation.warns:
-        click.echo(
-            "  = help: let the lines count: a number that only falls, or only rises, while they run; "
+        attach(
+            "help",
+            "let the lines count: a number that only falls, or only rises, while they run; "
             f"`--trace {4 * cycles}` looks at longer runs",
-            err=True,
         )
 
 
@@ -145,14 +137,14 @@ def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanati
         else f"broken in cycle {finding.broken_at}"
     )
     alone = f" of level `{finding.level}` alone" if explanation.supposes else ""
-    click.echo(f"  = note: {what}{alone}{begins}, {run_by}{legal}", err=True)
+    attach("note", f"{what}{alone}{begins}, {run_by}{legal}")
     if explanation.supposes:
         gives = "; ".join(
             f"`{owner}` gives such {', '.join(f'`{name}`' for name in names)}"
             for owner, names in explanation.supposes.items()
         )
-        click.echo(f"  = note: supposed, and not shown of the system: {gives}", err=True)
-    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
+        attach("note", f"supposed, and not shown of the system: {gives}")
+    _say_time_line(_run(systems, finding))
 
 
 def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
@@ -160,14 +152,14 @@ def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanat
     finding = explanation.supposed
     if finding is None:
         return
-    click.echo(
-        "  = note: the proof stops here, at a state that it does not exclude; whether that is ever reached is not known",
-        err=True,
+    attach(
+        "note",
+        "the proof stops here, at a state that it does not exclude; whether that is ever reached is not known",
     )
-    _say_time_line((*beginnings(systems, finding), *rows(systems, finding)))
-    click.echo(
-        "  = help: if it is reached, the table has to do otherwise there; if not, an `invariant` that says why is proved, and used here",
-        err=True,
+    _say_time_line(_run(systems, finding))
+    attach(
+        "help",
+        "if it is reached, the table has to do otherwise there; if not, an `invariant` that says why is proved, and used here",
     )
 
 
@@ -187,23 +179,24 @@ def _say_consequences(
         alike[kind] += 1
         shown = alike[kind] <= ALIKE or then.how is How.STOPS
         run = "" if then.shared or not shown else "; its run"
-        click.echo(f"  = then {number}: {told(systems[then.level], then)}{run}", err=True)
+        attach(f"then {number}", f"{told(systems[then.level], then)}{run}")
         if shown:
             _say_time_line(_further_rows(systems, then))
     if explanation.follows is not None and len(explanation.follows) == MOST:
-        click.echo(f"  = note: no more than {MOST} such runs are looked for", err=True)
+        attach("note", f"no more than {MOST} such runs are looked for")
     if explanation.follows == () and ts.links.above is not None:
-        click.echo(
-            f"  = then: nothing that `{ts.links.above.name}` takes tells of it in {further} cycles more",
-            err=True,
-        )
+        attach("then", f"nothing that `{ts.links.above.name}` takes tells of it in {further} cycles more")
 
 
 def _further_rows(systems: Mapping[str, TransitionSystem], then: Consequence) -> tuple[TimeLineRow, ...]:
     """Return the rows of a run that the finding's own does not have."""
-    every = rows(systems, then.run)
-    later = tuple(row for row in every if row.tick > then.run.broken_at)
-    return later if then.shared else (*beginnings(systems, then.run), *every)
+    every = _run(systems, then.run)
+    return tuple(row for row in every if row.tick > then.run.broken_at) if then.shared else every
+
+
+def _run(systems: Mapping[str, TransitionSystem], finding: Finding | None) -> tuple[TimeLineRow, ...]:
+    """Return every row of a run, from where it begins; none where there is no run."""
+    return () if finding is None else (*beginnings(systems, finding), *rows(systems, finding))
 
 
 def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
@@ -256,24 +249,15 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
         "supposes": {owner: list(names) for owner, names in explanation.supposes.items()},
         "notes": list(explanation.notes),
         "lap": 0 if finding is None else finding.lasso,
-        "time_line": []
-        if finding is None
-        else [asdict(row) for row in (*beginnings(systems, finding), *rows(systems, finding))],
-        "supposed": []
-        if explanation.supposed is None
-        else [
-            asdict(row)
-            for row in (*beginnings(systems, explanation.supposed), *rows(systems, explanation.supposed))
-        ],
+        "time_line": [asdict(row) for row in _run(systems, finding)],
+        "supposed": [asdict(row) for row in _run(systems, explanation.supposed)],
         "follows": [
             {
                 "how": then.how.value,
                 "what": told(systems[then.level], then),
                 "cycle": then.cycle,
                 "takes": dict(spelled_leaves(systems[then.level], then.report)),
-                "time_line": [
-                    asdict(row) for row in (*beginnings(systems, then.run), *rows(systems, then.run))
-                ],
+                "time_line": [asdict(row) for row in _run(systems, then.run)],
             }
             for then in explanation.follows or ()
         ],

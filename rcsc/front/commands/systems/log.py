@@ -148,7 +148,6 @@ def _displays(log: Log, system: Path | None) -> Mapping[str, Sequence[str]]:
 
 
 def _summary(log: Log) -> None:
-
     count = len(log.ticks)
     seconds = count * log.tick_ms / 1000
     click.echo(f"{log.facts['name']}: {count} ticks of {log.tick_ms} ms, {seconds:g} s")

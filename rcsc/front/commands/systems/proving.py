@@ -17,7 +17,6 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
-from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.invariant.cubes import as_condition, shown
@@ -49,6 +48,7 @@ from rcsc.front.commands.shared.proved import (
     trusting,
 )
 from rcsc.front.commands.shared.show import Progress, UnwritableError
+from rcsc.front.commands.shared.stopped import say_error
 from rcsc.front.commands.systems.explained import explanation_as_json, say_explanation
 from rcsc.lang.model import Kind
 from rcsc.proof.solvers.options import Limits
@@ -94,7 +94,14 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
     length = usual_length(systems.values()) if asked.cycles is None else asked.cycles
-    search = _Search(length, asked.further, _starts(systems, asked.begins))
+    settings = TraceSettings(
+        description(path),
+        length,
+        altered=bool(asked.variants),
+        log=asked.logs,
+        further=asked.further,
+        starts=_starts(systems, asked.begins),
+    )
     for name in asked.variants:
         systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
     effort = Effort(limits=Limits.of(asked.steps))
@@ -107,8 +114,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         _write(asked.certificate, systems, proof)
     if not asked.as_json:
         _say(_lines(path, systems, proof, asked))
-    keep = _Keep(path, asked.logs, asked.freeze, asked.variants)
-    explanations = _explanations(systems, proof, search, keep, quiet=asked.as_json)
+    explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
         _say(_lines(path, systems, proof, asked, explanations))
     _say_not_agreed(proof)
@@ -197,10 +203,7 @@ def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet:
             f"level {level.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet
         )
         for name in wrong:
-            click.echo(
-                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{level.level}`: cvc5 does not confirm `{name}`",
-                err=True,
-            )
+            say_error(Code.SOLVERS_DISAGREE, f"level `{level.level}`: cvc5 does not confirm `{name}`")
     return refused
 
 
@@ -243,7 +246,6 @@ def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> It
 
 
 def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
-
     for level in proof.levels:
         yield f"invariant of level {level.level}: never"
         for clause in level.clauses:
@@ -261,7 +263,6 @@ def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> 
 
 
 def _whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
-
     yield from (
         *reaction(systems, proof),
         *pauses(systems),
@@ -290,7 +291,6 @@ def _unconnected(systems: Mapping[str, TransitionSystem], system: Description) -
 
 
 def _agreements(proof: SystemProof) -> Iterator[str]:
-
     if proof.agreements:
         yield "between the levels"
     for agreement in proof.agreements:
@@ -303,25 +303,6 @@ def _agreements(proof: SystemProof) -> Iterator[str]:
         yield f"    {standing}{agreement.reason}"
 
 
-@dataclass(frozen=True, slots=True)
-class _Keep:
-    """The places where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
-
-    system: Path
-    logs: Path | None
-    cases: Path | None
-    variants: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """The search for runs: of how many cycles, followed on for how many, and with which initial values."""
-
-    cycles: int
-    further: int
-    starts: Starts
-
-
 def _starts(systems: dict[str, TransitionSystem], begins: Sequence[str]) -> Starts:
     """Read the initial values that runs are searched from."""
     try:
@@ -331,42 +312,28 @@ def _starts(systems: dict[str, TransitionSystem], begins: Sequence[str]) -> Star
 
 
 def _explanations(
+    path: Path,
     systems: dict[str, TransitionSystem],
     proof: SystemProof,
-    search: _Search,
-    keep: _Keep,
-    *,
-    quiet: bool,
+    asked: Asked,
+    settings: TraceSettings,
 ) -> list[Explanation]:
     """Explain each unproved claim, with its shortest trace where there is one."""
-    settings = TraceSettings(
-        description(keep.system),
-        search.cycles,
-        altered=bool(keep.variants),
-        log=keep.logs,
-        further=search.further,
-        starts=search.starts,
-    )
     explanations = []
     try:
         for explanation in explain(systems, proof, settings):
             explanations.append(explanation)
-            if keep.cases is not None and explanation.finding is not None and not explanation.beside:
-                _freeze(systems, explanation.finding, keep.cases, keep)
-            if not quiet:
-                say_explanation(systems, explanation, search.cycles, search.further)
+            if asked.freeze is not None and explanation.finding is not None and not explanation.beside:
+                asked.freeze.mkdir(parents=True, exist_ok=True)
+                case = asked.freeze / f"{settings.system.name}_{file_name(explanation.finding)}.json"
+                text = frozen(explanation.finding, systems, path, case, asked.variants)
+                write_atomically(case, text.encode())
+            if not asked.as_json:
+                say_explanation(systems, explanation, settings.most, settings.further)
     except OSError as error:
-        raise UnwritableError(
-            str(error.filename or keep.logs), error.strerror or "no reason given"
-        ) from error
+        place = str(error.filename or asked.logs)
+        raise UnwritableError(place, error.strerror or "no reason given") from error
     return explanations
-
-
-def _freeze(systems: dict[str, TransitionSystem], finding: Finding, folder: Path, keep: _Keep) -> None:
-
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
-    write_atomically(path, frozen(finding, systems, keep.system, path, keep.variants).encode())
 
 
 def run_cases(cases: tuple[Path, ...]) -> int:
@@ -380,22 +347,17 @@ def run_cases(cases: tuple[Path, ...]) -> int:
             click.echo(f"{path}: {outcome}")
         else:
             wrong += 1
-            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {outcome}", err=True)
+            say_error(Code.FOUND_AGAIN, f"{path}: {outcome}")
     return 1 if wrong else 0
 
 
 def _say_not_agreed(proof: SystemProof) -> None:
-
     for agreement in proof.agreements:
         if not agreement.holds:
-            click.echo(
-                f"error[{Code.NOT_AGREED.value}]: level `{agreement.level}` assumes that {agreement.assumed}",
-                err=True,
-            )
+            say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
 
 
 def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
-
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for level in proof.levels:
@@ -408,7 +370,6 @@ def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProo
 def _as_json(
     proof: SystemProof, systems: dict[str, TransitionSystem], explanations: Sequence[Explanation]
 ) -> dict[str, Any]:
-
     return {
         "proved": proof.proved,
         "whole": proof.whole,

@@ -2,7 +2,6 @@
 
 import contextlib
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -107,7 +106,6 @@ def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:
 
 
 def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None:
-
     click.echo(f"cycle {moment.tick}, {moment.tick * again.log.tick_ms} ms")
     for cycle in moment.cycles:
         if cycle.restarted is not None:
@@ -125,26 +123,14 @@ def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None
 
 def _differs(file: Path, again: Replay, moment: ReplayMoment) -> int:
     first = next(cycle for cycle in moment.cycles if cycle.differences)
-    leaf = _leading(first)
+    leaf = next((one for one in first.differences if one.name not in TRACED), first.differences[0])
     difference = f"`{leaf.name}` was `{leaf.then}` and is `{leaf.now}`"
     where = f"cycle {moment.tick}, level `{first.level}`"
     notes = tuple(note for cycle in moment.cycles if cycle.differences for note in _notes(cycle))
     if again.unchanged:
         return refuse(file, Code.REPLAY_DIFFERS, f"the replay differs in {where}: {difference}", notes=notes)
-    return refuse(
-        file,
-        Code.TABLES_DECIDE_OTHERWISE,
-        f"these tables decide otherwise in {where}: {difference}",
-        notes=notes,
-    )
-
-
-def _leading(cycle: ReplayedCycle) -> Any:
-    """Return the difference to name: a leaf's, where there is one."""
-    return next(
-        (difference for difference in cycle.differences if difference.name not in TRACED),
-        cycle.differences[0],
-    )
+    message = f"these tables decide otherwise in {where}: {difference}"
+    return refuse(file, Code.TABLES_DECIDE_OTHERWISE, message, notes=notes)
 
 
 def _notes(cycle: ReplayedCycle) -> tuple[str, ...]:

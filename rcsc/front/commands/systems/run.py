@@ -22,7 +22,7 @@ from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLA
 from rcsc.front.commands.systems.studio import serve
 from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription, Description, description
-from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun
+from rcsc.run.orders.operator import MOST_TICKS, Operator, ScriptedRun
 from rcsc.run.orders.script import BadScript
 from rcsc.run.orders.stopped import NotKept, StoppedRuns
 from rcsc.run.plant.staging import StageOrder, staged, standing
@@ -219,7 +219,7 @@ def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, r
         BadScript: There is no such row.
         CodedError: There is nothing to go on from.
     """
-    _check_row(run, from_row)
+    _check_row(run.operator, from_row)
     if resumes and resume is None:
         why = (
             "this plant cannot be put back as it stood"
@@ -235,10 +235,16 @@ def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, r
         run.operator.begin_at(from_row - 1)
 
 
-def _check_row(run: ScriptedRun, from_row: int | None) -> None:
-    rows = 0 if run.operator is None else len(run.operator.rows)
+def _check_row(operator: Operator | None, from_row: int | None) -> int:
+    """Return the number of rows of the script.
+
+    Raises:
+        BadScript: It has no such row.
+    """
+    rows = 0 if operator is None else len(operator.rows)
     if from_row is not None and from_row > rows:
         raise BadScript(f"the script has {rows} rows, and none is {from_row}")
+    return rows
 
 
 # --- while it runs ---
@@ -330,10 +336,7 @@ def _checked_apart(
             "processes run until a script ends, and none is named",
             "`--script FILE` names one",
         )
-    rows = len(stage.operator.rows)
-    if from_row is not None and from_row > rows:
-        raise BadScript(f"the script has {rows} rows, and none is {from_row}")
-    return rows
+    return _check_row(stage.operator, from_row)
 
 
 def _rows_apart(asked: RunOptions, system: Description, first: int, results: Path) -> list[list[Any]]:
@@ -345,17 +348,14 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
     if not asked.quiet:
         click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
 
-    def watch(_: Supervisor) -> None:
-        show()
-
-    def show() -> None:
+    def show(*_: Supervisor) -> None:
         new = [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
         for number, text, state, reason, ticks in [] if asked.quiet else new:
             _say(number, text, state, reason, ticks)
         rows.extend(new)
 
     results.touch()
-    run_processes(system, asked.kind, {"outside": outside}, queries=queries, rate=rate, watch=watch)
+    run_processes(system, asked.kind, {"outside": outside}, queries=queries, rate=rate, watch=show)
     show()
     return rows
 

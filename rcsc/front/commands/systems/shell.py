@@ -23,6 +23,7 @@ from rcsc.base.host.files.read import Malformed, lines_of, standard_input, text,
 from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.commands import Commands
 from rcsc.desk.shell.opening import Opening, opened
+from rcsc.front.commands.shared.stopped import attach
 from rcsc.front.commands.shared.systems import COMPILES, EXECUTOR, PLANT, made, system_path
 from rcsc.run.orders.script import BadScript
 
@@ -119,7 +120,7 @@ def _complain(where: str, refused: Refused) -> None:
     for line in rest:
         click.echo(f"  {line}", err=True)
     for words in refused.helps:
-        click.echo(f"  = help: {words}", err=True)
+        attach("help", words)
 
 
 def _follow(commands: Commands, lines: Iterable[str], name: str) -> int:

@@ -92,7 +92,6 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
 
 def _asked(paths: tuple[str, ...], revision: str | None) -> tuple[Given, Given]:
-
     if revision is not None:
         return revisions(revision, paths)
     if len(paths) != 2:
@@ -127,7 +126,6 @@ def _refuse(code: Code, message: str, *helps: str) -> int:
 
 
 def _text(compared: Difference, form: str, quiet: bool, color: bool) -> str:
-
     if form == "json":
         return json_text(to_json(compared))
     if form == "markdown":

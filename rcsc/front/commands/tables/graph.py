@@ -89,7 +89,6 @@ def _form_of(out: Path | None) -> str:
 
 
 def _derived(entry: FoundTable, lines: bool, state: str, options: Options) -> Derived:
-
     file = entry.loaded.files[entry.table.file]
     derived = (
         derive_lines(entry.program, entry.table, file, options)
@@ -123,7 +122,6 @@ def _draw(entry: FoundTable, form: str, derived: Derived, out: Path | None, opti
 
 
 def _drawing(entry: FoundTable, derived: Derived) -> str:
-
     try:
         return svg(derived.graph, derived.everywhere)
     except NoLayoutError as error:

@@ -55,7 +55,6 @@ def command(
 
 
 def _tabled(drawn: str, form: str | None) -> Tabled:
-
     try:
         raw = piped(standard_input(), MOST_BYTES) if drawn == "-" else content(Path(drawn), MOST_BYTES)
         source = Source(drawn, plain(decoded(raw)))
@@ -72,7 +71,6 @@ def _tabled(drawn: str, form: str | None) -> Tabled:
 
 
 def _prove(read_table: Tabled, named: str, options: Options) -> None:
-
     name = read_table.table.name.text
     entries = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
     entry = next((candidate for candidate in entries if candidate.table.name == name), entries[0])
@@ -84,7 +82,6 @@ def _prove(read_table: Tabled, named: str, options: Options) -> None:
 
 
 def _placed(read_table: Tabled, file: str) -> str:
-
     loaded = load([file])
     if loaded.diagnostics:
         raise WrongError(loaded.diagnostics, loaded.sources)
