@@ -97,8 +97,11 @@ def put_back(moment: KeptMoment, system: System, memory: Memory) -> None:
 
 def _copied(outside: Outside) -> Outside:
     """A copy that shares what never changes, as the database."""
-    parts = [getattr(outside, field.name, None) for field in fields(outside)] if is_dataclass(outside) else []
-    return copy.deepcopy(outside, {id(part): part for part in parts if _is_frozen(part)})
+    return copy.deepcopy(outside, {id(part): part for part in _parts(outside) if _is_frozen(part)})
+
+
+def _parts(whole: object) -> list[object]:
+    return [getattr(whole, field.name, None) for field in fields(whole)] if is_dataclass(whole) else []
 
 
 def _is_frozen(value: object) -> bool:

@@ -51,7 +51,12 @@ def concerns(
     build = Build(opening.path, hub, live, agreement)
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do, first)
-    live.opened.append(lambda session: _sees(session, desk))
+
+    def sees(session: Session) -> None:
+        """Let `reload` refuse a file on disk while a page shows another text of it."""
+        session.plant = replace(session.plant, unwritten=desk.unwritten)
+
+    live.opened.append(sees)
     cell = Scene(time, hub.tell, drawer)
     return (
         live,
@@ -67,8 +72,3 @@ def concerns(
         Moments(hub, time, cell),
         Findings(desk),
     )
-
-
-def _sees(session: Session, desk: Desk) -> None:
-    """Let `reload` refuse a file on disk while a page shows another text of it."""
-    session.plant = replace(session.plant, unwritten=desk.unwritten)

@@ -136,34 +136,38 @@ def _tried(level: RunningLevel, buffers: Buffers, *, run: bool) -> _Tried:
     return _Tried(taken, left)
 
 
-def _look(program: Program, level: RunningLevel, taken: Values) -> tuple[Table, Mapping[str, Value]] | None:
-    """The table of the next cycle and what it sees; None where an input is refused first.
+def tables_tried(
+    program: Program, level: str, began: Mapping[str, Value]
+) -> Iterator[tuple[Table, Mapping[str, Value]]]:
+    """Yield each table that a cycle tries, with the values that it sees.
 
-    Source: `rcsc.lang.interpret.cycle`, up to where the table looks.
+    Source: `rcsc.lang.interpret.cycle`, up to where the last table looks.
 
     Args:
-        program: What the level's tables mean; without extern procedures.
-        level: The level.
-        taken: All leaves, with the inputs.
+        program: The level's.
+        level: Its name.
+        began: All leaves: states and outputs as the cycle before left them, inputs as this one takes them.
+
+    Raises:
+        Refused: An input is refused, and no table is tried.
     """
-    model = model_of(program, level)
-    now = admit(program, {leaf.name: value for leaf, value in zip(level.sign.leaves, taken, strict=False)})
+    own = model_of(program, level)
+    now = admit(program, began)
     if isinstance(now, str):
-        return None
+        raise Refused(Code.STUDIO, f"no table was tried: input `{now}` was refused")
     settle(program, now)
-    for procedure in model.preprocess:
+    for procedure in own.preprocess:
         call(program, procedure, [], now)
-    for stage in model.stages:
-        table = chosen_table(program, stage, now)
-        seen = dict(now)
-        if run_stage(program, table, now) is not Fault.OK:
-            return table, seen
-    return chosen_table(program, model.tables, now), now
+    for choice in own.choices:
+        table = chosen_table(program, choice, now)
+        yield table, dict(now)
+        if choice is not own.choices[-1] and run_stage(program, table, now) is not Fault.OK:
+            return
 
 
-def model_of(program: Program, running: RunningLevel) -> Level:
+def model_of(program: Program, name: str) -> Level:
     """The level as its program has it."""
-    return next(level for level in program.levels if level.name == running.name)
+    return next(level for level in program.levels if level.name == name)
 
 
 def _otherwise(
@@ -229,7 +233,7 @@ def _difference(difference: ProgramDifference) -> Iterator[str]:
 
 def _met(difference: ProgramDifference, new: RunningLevel, program: Program) -> tuple[Met, ...]:
     now = {leaf.name: value for leaf, value in zip(new.sign.leaves, new.values, strict=False)}
-    return within_reach(difference, program, model_of(program, new), now, Options(steps=REACH_STEPS))
+    return within_reach(difference, program, model_of(program, new.name), now, Options(steps=REACH_STEPS))
 
 
 def _reach(difference: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
@@ -265,11 +269,14 @@ def _met_parts(met: Sequence[Met]) -> list[str]:
 
 
 def _proved(old: Running, new: RunningLevel, program: Program, taken: Values) -> None:
-    """Refuse a next cycle that the proof of its table does not cover."""
-    looked = _look(program, new, taken)
-    if looked is not None:
-        _in_proof(new, program, *looked)
-        _known(old, new, program, *looked)
+    """Refuse a next cycle that the proof of its table does not cover; nothing is looked at where an input is refused first."""
+    began = {leaf.name: value for leaf, value in zip(new.sign.leaves, taken, strict=False)}
+    try:
+        *_, looked = tables_tried(program, new.name, began)
+    except Refused:
+        return
+    _in_proof(new, program, *looked)
+    _known(old, new, program, *looked)
 
 
 def _in_proof(level: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:

@@ -88,7 +88,7 @@ class Mark:
 
     Attributes:
         tick: After which it was.
-        kind: `hand`, or `stop`.
+        kind: `hand`, `stop`, or, of a log, `finding`.
         changes: The session's then; where `undo` has gone back behind it, it is no more.
     """
 
@@ -320,7 +320,7 @@ class Live(Concern):
             raise
         finally:
             self.history.settle(commands.session.system)
-            self._forget_marks(commands.session.changes)
+            self.marks[:] = [mark for mark in self.marks if mark.changes <= commands.session.changes]
             self.changed()
         if (
             line.split()[:1]
@@ -443,9 +443,6 @@ class Live(Concern):
         self.marks.append(Mark(tick, kind, text, self.session().changes))
         del self.marks[:-MOST_MARKS]
         self.changed()
-
-    def _forget_marks(self, changes: int) -> None:
-        self.marks[:] = [mark for mark in self.marks if mark.changes <= changes]
 
 
 def _shown(lines: Output, refused: Refused | None) -> Json:

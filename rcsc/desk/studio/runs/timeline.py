@@ -12,23 +12,18 @@ from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
+from rcsc.desk.shell.reload.gate import tables_tried
 from rcsc.desk.studio.hub import PROVER, Ask, Concern, Json
 from rcsc.desk.studio.runs.history import History
-from rcsc.desk.studio.runs.live import LANE, Live, level_shown, range_of
+from rcsc.desk.studio.runs.live import LANE, Live, Mark, level_shown, range_of
 from rcsc.desk.studio.runs.logs import KeptFinding
 from rcsc.desk.studio.runs.shown import Lines, Shown
 from rcsc.lang.interpret import (
     UNDEFINED,
     ExternError,
-    Fault,
-    admit,
     answering,
-    call,
-    chosen_table,
     failed_assumptions,
     holds,
-    run_stage,
-    settle,
 )
 from rcsc.lang.leaves import conjuncts, read_by
 from rcsc.lang.model import Expr, Line, Procedure, Program, Table, Test, Value, spell
@@ -163,11 +158,11 @@ class TimeLine(Concern):
             "marks": [asdict(mark) for mark in self._marks()][-MOST_MARKED:],
         }
 
-    def _marks(self) -> Iterator[Any]:
+    def _marks(self) -> Iterator[Mark]:
         if self._log is None:
             yield from self.live.marks
         elif self._log.finding is not None:
-            yield _Marked(self._log.finding.tick, "finding", self._log.finding.text)
+            yield Mark(self._log.finding.tick, "finding", self._log.finding.text)
 
     # --- values ---
 
@@ -256,13 +251,6 @@ class TimeLine(Concern):
         return {"tick": None}
 
 
-@dataclass(frozen=True, slots=True)
-class _Marked:
-    tick: int
-    kind: str
-    text: str
-
-
 def _leaf(sign: Signature, at: int) -> dict[str, Any]:
     leaf = sign.leaves[at]
     kind = "choice" if leaf.members else "bool" if leaf.c_type == "bool" else number_word(leaf)
@@ -325,27 +313,14 @@ def why(program: Program, level: str, began: Snapshot) -> tuple[TableJudged, ...
     Raises:
         Refused: The cycle ended before a table was tried, or cannot be played again.
     """
-    own = next(one for one in program.levels if one.name == level)
-    now = admit(program, began)
-    if isinstance(now, str):
-        raise Refused(Code.STUDIO, f"no table was tried: input `{now}` was refused")
-    judged = []
     try:
         with answering(_not_again):
-            settle(program, now)
-            for name in own.preprocess:
-                call(program, name, [], now)
-            for choice in own.choices:
-                table = chosen_table(program, choice, now)
-                judged.append(_table(program, table, now))
-                if choice is not own.choices[-1] and run_stage(program, table, now) is not Fault.OK:
-                    break
+            return tuple(_judged(program, table, now) for table, now in tables_tried(program, level, began))
     except (*UNDEFINED, ExternError, KeyError) as error:
         raise Refused(Code.STUDIO, f"the cycle cannot be played again: {error}") from error
-    return tuple(judged)
 
 
-def _table(program: Program, table: Table, now: Snapshot) -> TableJudged:
+def _judged(program: Program, table: Table, now: Snapshot) -> TableJudged:
     lines = tuple(_line(program, table, line, now) for line in table.lines)
     default = "" if table.default is None else str(table.default.name)
     return TableJudged(table.name, lines, failed_assumptions(program, table, now), default)

@@ -15,7 +15,7 @@ from rcsc.desk.editor.values import BEING_PROVED, Answer, Finding, Grid, GridRow
 from rcsc.desk.studio.tables.document import Document
 from rcsc.lang.interpret import evaluate, holds
 from rcsc.lang.model import Program, Snapshot, Table, spell, value_of_text
-from rcsc.views.graph.chart import Sheet, SheetBox, SheetRow
+from rcsc.views.graph.chart import Sheet, SheetBox
 
 Json = dict[str, Any]
 
@@ -251,9 +251,5 @@ def _box(box: SheetBox) -> Json:
         "states": box.states,
         "corner": box.corner,
         "size": (box.width_px, box.height_px),
-        "rows": [_sheet_row(row) for row in box.rows],
+        "rows": [asdict(row) | {"badge_px": row.badge_px, "height_px": row.height_px} for row in box.rows],
     }
-
-
-def _sheet_row(row: SheetRow) -> Json:
-    return asdict(row) | {"badge_px": row.badge_px, "height_px": row.height_px}
