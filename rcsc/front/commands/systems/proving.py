@@ -106,10 +106,10 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
     effort = Effort(limits=Limits.of(asked.steps))
     names = asked.only or tuple(systems)
+    large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
     with _LevelProgress(names, wanted=asked.progress) as done:
-        proof = prove_transition_systems(
-            systems, effort, asked.jobs or _jobs([systems[name] for name in names]), names, done, cache
-        )
+        jobs = asked.jobs or (cores() if large else 1)
+        proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
     if asked.certificate is not None:
         _write(asked.certificate, systems, proof)
     if not asked.as_json:
@@ -117,7 +117,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
         _say(_lines(path, systems, proof, asked, explanations))
-    _say_not_agreed(proof)
+    for agreement in (each for each in proof.agreements if not each.holds):
+        say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
     if refused or any(explanation.bug for explanation in explanations):
         return 3
@@ -157,11 +158,6 @@ def _lines(
     yield from _agreements(proof)
     yield from _whole(systems, proof)
     yield from _unconnected(systems, description(path))
-
-
-def _jobs(levels: Iterable[TransitionSystem]) -> int:
-    """Return how many levels to prove at once by default."""
-    return cores() if sum(map(lines_in, levels)) >= _WORTH_PROCESSES else 1
 
 
 class _LevelProgress:
@@ -349,12 +345,6 @@ def run_cases(cases: tuple[Path, ...]) -> int:
             wrong += 1
             say_error(Code.FOUND_AGAIN, f"{path}: {outcome}")
     return 1 if wrong else 0
-
-
-def _say_not_agreed(proof: SystemProof) -> None:
-    for agreement in proof.agreements:
-        if not agreement.holds:
-            say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
 
 
 def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
