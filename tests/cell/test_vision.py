@@ -24,7 +24,7 @@ from rcsc_cell.vision.flood import Features, FoundPart, find
 from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
 from rcsc_cell.vision.line import LEAN, Surface, measure
 from rcsc_cell.vision.optics import STANDARD, Floats, FloodImage, LineImage
-from tests.bench import vision as bench
+from tests.support import scenes
 from tests.support.scenes import (
     BBOX,
     HOUS,
@@ -57,14 +57,14 @@ def touch(scene: Scene, size: Size, seed: int = 1) -> Surface | None:
 # --- FLOOD-FLASH ---
 
 
-@pytest.mark.parametrize("size", SIZES, ids=bench.NAMES)
+@pytest.mark.parametrize("size", SIZES, ids=scenes.NAMES)
 def test_flood_is_good_enough_to_grasp(size: Size) -> None:
-    errors = bench.flood(size, 40)
+    errors = scenes.flood(size, 40)
     assert errors.failures == 0
     assert np.mean(errors.place_mm) < 0.3
-    assert bench.worst(errors.place_mm) < 0.8
-    assert bench.worst(errors.roll_deg) < 2.0
-    assert bench.worst(errors.range_percent) < 1.5
+    assert scenes.worst(errors.place_mm) < 0.8
+    assert scenes.worst(errors.roll_deg) < 2.0
+    assert scenes.worst(errors.range_percent) < 1.5
 
 
 @pytest.mark.parametrize(
@@ -166,14 +166,14 @@ def test_light_that_the_camera_does_not_see_says_nothing() -> None:
 # --- LINE-FLASH ---
 
 
-@pytest.mark.parametrize("size", SIZES, ids=bench.NAMES)
+@pytest.mark.parametrize("size", SIZES, ids=scenes.NAMES)
 def test_line_lands_on_the_papers_accuracy(size: Size) -> None:
     """Section 5.2: 0.2 % of the range; 2 % of a right angle, 1.8 degrees. Neither worse nor much better."""
-    errors = bench.line(size, 200)
+    errors = scenes.line(size, 200)
     assert errors.failures == 0
-    assert 0.15 < bench.rms(errors.range_percent) < 0.23
-    assert 1.2 < bench.rms(errors.normal_deg) < 2.7
-    assert bench.worst(errors.normal_deg) < 9.0
+    assert 0.15 < scenes.rms(errors.range_percent) < 0.23
+    assert 1.2 < scenes.rms(errors.normal_deg) < 2.7
+    assert scenes.worst(errors.normal_deg) < 9.0
 
 
 @given(
@@ -196,8 +196,8 @@ def test_without_noise_line_is_exact(size: Size, yaw: float, tilt: float, off_mm
 def test_equal_tops_are_told_apart_by_line_alone() -> None:
     """Section 5.2, bench tolerances: FLOOD takes either for the other, LINE never."""
     for lying, expected in ((TBOX, BBOX), (BBOX, TBOX)):
-        assert bench.accepted(lying, expected, 15) == (15, 0)
-        assert bench.accepted(lying, lying, 15) == (15, 15)
+        assert scenes.accepted(lying, expected, 15) == (15, 0)
+        assert scenes.accepted(lying, lying, 15) == (15, 15)
 
 
 def test_a_neighbour_of_another_height_does_not_count() -> None:
@@ -419,44 +419,44 @@ def top_of(scene: Scene) -> Top:
     return Top(middle[0], middle[1], -middle[2], length_mm, width_mm, true.roll_rad, (x, y, z))
 
 
-@pytest.mark.parametrize("size", SIZES, ids=bench.NAMES)
+@pytest.mark.parametrize("size", SIZES, ids=scenes.NAMES)
 def test_formulas_make_the_errors_that_pictures_make(size: Size) -> None:
     scene, rng = Scene(size), np.random.default_rng(11)
-    formula, picture = bench.Errors(), bench.flood(size, 100)
+    formula, picture = scenes.Errors(), scenes.flood(size, 100)
     for _ in range(400):
-        scene.put(0, *anywhere(rng, bench.FLOOD_REACH_MM))
+        scene.put(0, *anywhere(rng, scenes.FLOOD_REACH_MM))
         found = perceive([top_of(scene)], features(size), expected_mm(size), rng)
-        assert found is not None
-        bench.note_found(formula, scene, found)
+        formula.found(scene, found)
+    assert formula.failures == 0
     # A thin part shows less of its sides than the formulas, which do not know how thick it is, take for granted.
-    assert bench.rms(formula.place_mm) == pytest.approx(bench.rms(picture.place_mm), rel=0.6)
-    assert bench.rms(formula.roll_deg) == pytest.approx(bench.rms(picture.roll_deg), rel=0.5)
+    assert scenes.rms(formula.place_mm) == pytest.approx(scenes.rms(picture.place_mm), rel=0.6)
+    assert scenes.rms(formula.roll_deg) == pytest.approx(scenes.rms(picture.roll_deg), rel=0.5)
     assert np.mean(formula.range_percent) == pytest.approx(np.mean(picture.range_percent), abs=0.12)
-    formula, picture = bench.Errors(), bench.line(size, 200, lean_deg=0.0)
+    formula, picture = scenes.Errors(), scenes.line(size, 200, lean_deg=0.0)
     for _ in range(400):
-        scene.put(0, *anywhere(rng, bench.LINE_REACH_MM))
+        scene.put(0, *anywhere(rng, scenes.LINE_REACH_MM))
         surface = perceive_surface(top_of(scene), rng)
-        assert surface is not None
-        bench.note_surface(formula, scene, surface)
-    assert bench.rms(formula.range_mm) == pytest.approx(bench.rms(picture.range_mm), rel=0.15)
-    assert bench.rms(formula.normal_deg) == pytest.approx(bench.rms(picture.normal_deg), rel=0.2)
+        formula.touched(scene, surface)
+    assert formula.failures == 0
+    assert scenes.rms(formula.range_mm) == pytest.approx(scenes.rms(picture.range_mm), rel=0.15)
+    assert scenes.rms(formula.normal_deg) == pytest.approx(scenes.rms(picture.normal_deg), rel=0.2)
 
 
 def test_formulas_grow_with_the_noise_as_pictures_do() -> None:
     scene, rng = Scene(TBOX, optics=replace(STANDARD, noise=0.08)), np.random.default_rng(12)
-    formula, picture = bench.Errors(), bench.Errors()
+    formula, picture = scenes.Errors(), scenes.Errors()
     for _ in range(120):
-        scene.put(0, *anywhere(rng, bench.FLOOD_REACH_MM))
+        scene.put(0, *anywhere(rng, scenes.FLOOD_REACH_MM))
         image = scene.camera.flood(scene.data, rng)
         for errors, found in (
             (picture, find(image, features(TBOX), expected_mm(TBOX))),
             (formula, perceive([top_of(scene)], features(TBOX), expected_mm(TBOX), rng, scene.optics)),
         ):
-            assert found is not None
-            bench.note_found(errors, scene, found)
-    assert bench.rms(picture.roll_deg) > 0.6
-    assert bench.rms(formula.roll_deg) == pytest.approx(bench.rms(picture.roll_deg), rel=0.3)
-    assert bench.rms(formula.place_mm) == pytest.approx(bench.rms(picture.place_mm), rel=0.3)
+            errors.found(scene, found)
+    assert formula.failures == picture.failures == 0
+    assert scenes.rms(picture.roll_deg) > 0.6
+    assert scenes.rms(formula.roll_deg) == pytest.approx(scenes.rms(picture.roll_deg), rel=0.3)
+    assert scenes.rms(formula.place_mm) == pytest.approx(scenes.rms(picture.place_mm), rel=0.3)
 
 
 def test_formulas_follow_a_leaning_top() -> None:

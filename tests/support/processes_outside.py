@@ -1,6 +1,5 @@
 """What stands outside the levels in `test_processes`: it is imported in processes of its own, and so imports little."""
 
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -149,15 +148,3 @@ def hammer(block: str, ready: str) -> None:
         number += 1
         buffers.publish("far.out", pattern(number))
         buffers.commit("wide", (*pattern(number), *pattern(number + 1), *trace))
-
-
-def echo(block: str, seconds: float) -> None:
-    """Repeats what the wide level says."""
-    buffers = SharedMemoryBuffers.attach(block, wide())
-    until = time.monotonic() + seconds
-    last: Values | None = None
-    while time.monotonic() < until:
-        now = buffers.latest("wide.out")
-        if now is not None and now is not last:
-            last = now
-            buffers.publish("far.out", now)

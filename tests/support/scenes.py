@@ -3,15 +3,16 @@
 The table's top is at height 0, the camera half a metre above it. What is true is read off the state, in camera axes.
 """
 
-from dataclasses import dataclass
-from math import cos, pi, sin
+from dataclasses import dataclass, field
+from math import cos, degrees, hypot, pi, radians, sin
 
 import mujoco
 import numpy as np
 
 from rcsc_cell.vision.blobs import half_turn
 from rcsc_cell.vision.camera import Camera
-from rcsc_cell.vision.flood import Features
+from rcsc_cell.vision.flood import Features, FoundPart, find
+from rcsc_cell.vision.line import Surface, measure
 from rcsc_cell.vision.optics import STANDARD, Floats, Optics
 
 ABOVE_MM = 500.0
@@ -106,6 +107,91 @@ def between(one: float, other: float) -> float:
 
 
 def anywhere(rng: np.random.Generator, reach_mm: float) -> tuple[float, float, float]:
-    """A random place and turn."""
     x, y = rng.uniform(-reach_mm, reach_mm, 2)
     return float(x), float(y), float(rng.uniform(-pi / 2, pi / 2))
+
+
+# --- what is seen, against what is true ---
+
+FLOOD_REACH_MM, LINE_REACH_MM = 60.0, 1.0
+LEAN_DEG = 5.0
+TOLERANCE_MM, FLAT_DEG = 2.0, 6.0
+NAMES = tuple("x".join(f"{side:.0f}" for side in size) for size in SIZES)
+
+
+@dataclass
+class Errors:
+    """Of each picture in which the part was found."""
+
+    failures: int = 0
+    place_mm: list[float] = field(default_factory=list)
+    roll_deg: list[float] = field(default_factory=list)
+    range_mm: list[float] = field(default_factory=list)
+    range_percent: list[float] = field(default_factory=list)
+    normal_deg: list[float] = field(default_factory=list)
+
+    def found(self, scene: Scene, part: FoundPart | None) -> None:
+        if part is None:
+            self.failures += 1
+            return
+        true = scene.truth(0)
+        self.place_mm.append(hypot(part.x_mm - true.middle_mm[0], part.y_mm - true.middle_mm[1]))
+        self.roll_deg.append(degrees(between(part.roll_rad, true.roll_rad)))
+        self._range(part.range_mm, true)
+
+    def touched(self, scene: Scene, surface: Surface | None) -> None:
+        if surface is None:
+            self.failures += 1
+            return
+        true = scene.truth(0)
+        x, y, z = true.normal.tolist()
+        self._range(surface.range_mm, true)
+        self.normal_deg.append(degrees(surface.angle_rad((x, y, z))))
+
+    def _range(self, range_mm: float, true: Truth) -> None:
+        self.range_mm.append(range_mm - true.range_mm)
+        self.range_percent.append(100 * (range_mm / true.range_mm - 1))
+
+
+def flood(size: Size, poses: int) -> Errors:
+    """Errors of FLOOD-FLASH at random places, at any turn."""
+    scene, rng, errors = Scene(size), np.random.default_rng(1), Errors()
+    for _ in range(poses):
+        scene.put(0, *anywhere(rng, FLOOD_REACH_MM))
+        image = scene.camera.flood(scene.data, rng)
+        errors.found(scene, find(image, features(size), expected_mm(size), scene.optics))
+    return errors
+
+
+def line(size: Size, poses: int, lean_deg: float = LEAN_DEG) -> Errors:
+    """Errors of LINE-FLASH near the camera's axis, at any turn, every other part leaning."""
+    scene, rng, errors = Scene(size), np.random.default_rng(2), Errors()
+    for number in range(poses):
+        tilt = radians(rng.uniform(-lean_deg, lean_deg)) * (number % 2)
+        scene.put(0, *anywhere(rng, LINE_REACH_MM), tilt, lift_mm=5.0 * (number % 2))
+        errors.touched(scene, measure(scene.camera.lines(scene.data, rng), expected_mm(size), scene.optics))
+    return errors
+
+
+def accepted(lying: Size, expected: Size, poses: int) -> tuple[int, int]:
+    """How often FLOOD finds one part where another is expected, and how often LINE then accepts it."""
+    scene, rng = Scene(lying), np.random.default_rng(3)
+    found = right = 0
+    for _ in range(poses):
+        scene.put(0, *anywhere(rng, FLOOD_REACH_MM))
+        if find(scene.camera.flood(scene.data, rng), features(expected), expected_mm(expected)) is None:
+            continue
+        found += 1
+        scene.put(0, *anywhere(rng, LINE_REACH_MM))
+        surface = measure(scene.camera.lines(scene.data, rng), expected_mm(expected))
+        near = surface is not None and abs(surface.range_mm - expected_mm(expected)) <= TOLERANCE_MM
+        right += near and surface is not None and surface.angle_rad() <= radians(FLAT_DEG)
+    return found, right
+
+
+def rms(values: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def worst(values: list[float]) -> float:
+    return float(np.max(np.abs(values)))

@@ -15,8 +15,7 @@ disk when the run ends, also after a kill: a keeper process sees to it.
 >>> memory.__doc__.splitlines()[0]
 'Common memory of several processes: one block of shared memory for a whole system.'
 
-Trusted: that a store of a machine word is seen whole. What it costs: a copy of each region in and out, which `python
--m tests.bench.transport` measures.
+Trusted: that a store of a machine word is seen whole. What it costs: a copy of each region in and out.
 
 Processes run by the clock, and on a machine that is too busy for that they run slower, but not apart: none begins a
 cycle while another is more than a period behind.

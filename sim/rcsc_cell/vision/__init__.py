@@ -15,7 +15,7 @@ counted from the camera along its axis. Lengths are millimetres.
 True
 
 Nothing here is trusted for a proof: the levels are proved for any report of the camera. What it costs: rays for a
-picture; `formulas` gives the same errors without pictures (`python -m tests.bench.vision` measures both against the
+picture; `formulas` gives the same errors without pictures (`tests/cell/test_vision.py` holds both against the
 truth).
 
 Modules, in the order the data flows: `optics`; `camera` makes pictures of the MuJoCo cell and alone knows MuJoCo;

@@ -16,7 +16,7 @@ class Optics:
     Accuracy is set here, on purpose. The paper has "ranges could be resolved to 0.2 %", about 1 mm, and "surface orientation
     to approximately 2 %". Read here: the range's error is 0.2 % rms or a little less (0.18 to 0.19 %), and the angle between
     measured and true normal is about 2 % of a right angle, 1.8 degrees, rms (1.6 on a top of 80 x 60, 2.4 on one of 60 x 40,
-    which the lines cross on a shorter way). `python -m tests.bench.vision` measures both.
+    which the lines cross on a shorter way). `tests/cell/test_vision.py` holds both.
 
     One row is worth z^2 / (focal_px * baseline_mm) in range, 9.7 mm at 460 mm: the two lines' rows are independent, so they
     bound the normal (`peak_px`), and an error that both lines share is in the range alone (`aim_rad`). That one is uniform,
