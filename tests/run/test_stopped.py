@@ -1,7 +1,7 @@
 """A script that stops is gone on with by another process, with any plant: all stands as it stood, or it is said why not."""
 
-import copy
 import enum
+import hashlib
 import json
 import random
 import re
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.levels import StateTableError
@@ -99,6 +100,18 @@ def _other_tables(folder: Path) -> None:
         file.write("# another line\n")
 
 
+def _damaged(folder: Path) -> None:
+    path = stopped_path(description(folder / "system.toml"))
+    said = json.loads(path.read_text(encoding="utf-8"))
+    said["stopped"]["operator"]["at"] = 3
+    path.write_text(json.dumps(said), encoding="utf-8")
+
+
+def _cut_short(folder: Path) -> None:
+    path = stopped_path(description(folder / "system.toml"))
+    path.write_bytes(path.read_bytes()[:-40])
+
+
 def _other_plant(folder: Path) -> None:
     base = (folder / "base.py").read_text(encoding="utf-8")
     (folder / "base.py").write_text(
@@ -110,19 +123,26 @@ def _other_plant(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [(_other_script, "it has changed since"), (_other_tables, "the tables have changed")],
+    ("change", "code", "message"),
+    [
+        (_other_script, Code.NOT_RESUMED, "it has changed since"),
+        (_other_tables, Code.BAD_SYSTEM, "the tables have changed"),
+        (_damaged, Code.NOT_RESUMED, "is damaged"),
+        (_cut_short, Code.NOT_RESUMED, "is damaged"),
+    ],
 )
-def test_another_script_or_other_tables_are_not_gone_on_with(
-    change: Callable[[Path], None], message: str, here: Path
+def test_what_is_not_gone_on_with_is_said_with_its_code_and_nothing_moves(
+    change: Callable[[Path], None], code: Code, message: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     stopped, keeps = begun(here, "")
     list(stopped.steps())
     keeps.keep(stopped, "mine")
     change(here)
-    other, goes_on = begun(here, "")
-    with pytest.raises(NotResumed, match=message):
-        goes_on.go_on(other)
+    assert run(["run", "dock", *QUICK, "--resume"]) == 1
+    shown = capsys.readouterr()
+    assert f"error[{code.value}]: " in shown.err
+    assert message in shown.err
+    assert shown.out == ""
 
 
 def test_a_plant_that_was_mended_meanwhile_goes_on_where_its_state_still_fits(here: Path) -> None:
@@ -242,27 +262,39 @@ def test_what_json_does_not_hold_is_not_kept(value: Any) -> None:
 ODD = [None, True, 3, -1, 2**200, 0.5, float("nan"), "", "x", [], {}, [1], {"a": 1}]
 
 
+def _odd(said: Any, rnd: Random) -> None:
+    """Puts something odd somewhere, beside something, or nowhere in its place."""
+    key: Any = rnd.choice(["tick", "operator", "levels", "buffers", "outside", "outside"])
+    holder, place = said, said[key]
+    while isinstance(place, dict | list) and place and rnd.random() < 0.9:
+        holder, key = place, rnd.choice(list(place) if isinstance(place, dict) else range(len(place)))
+        place = place[key]
+    how = rnd.random()
+    if how < 0.1:
+        del holder[key]
+    elif how < 0.2 and isinstance(holder, list):
+        holder.append(rnd.choice(ODD))
+    else:
+        holder[key] = rnd.choice(ODD)
+
+
 @pytest.mark.parametrize("plant", ["", "mujoco"])
-def test_a_state_that_was_changed_anywhere_is_taken_or_refused(plant: str, here: Path) -> None:
+def test_a_stopped_run_that_was_changed_anywhere_is_taken_or_refused(plant: str, here: Path) -> None:
     stopped, keeps = begun(here, plant)
     list(stopped.steps())
     path = keeps.keep(stopped, "mine")
     assert path == stopped_path(stopped.system.description)
-    good = json.loads(path.read_text(encoding="utf-8"))["stopped"]["outside"]["Together"]
+    good = path.read_bytes()
     rnd, refused = Random(len(plant)), 0  # noqa: S311  # drawn by seed
-    other, _ = begun(here, plant)
-    [outside] = other.system.outside
+    other, goes_on = begun(here, plant)
     for _ in range(60):
-        said = copy.deepcopy(good)
-        place: Any = said
-        while isinstance(place, dict | list) and place and (place is said or rnd.random() < 0.8):
-            keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-            holder, key = place, rnd.choice(keys)
-            place = place[key]
-        holder[key] = rnd.choice(ODD)
+        said = json.loads(good)["stopped"]
+        _odd(said, rnd)
+        digest = hashlib.sha256(json.dumps(said, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        path.write_text(json.dumps({"digest": digest, "stopped": said}), encoding="utf-8")
         try:
-            outside.restore(said)  # type: ignore[attr-defined]  # it is one that can
+            goes_on.go_on(other)
             other.system.step()
-        except (ValueError, StateTableError):
+        except (NotResumed, StateTableError):
             refused += 1
     assert refused > 20
