@@ -1,7 +1,7 @@
 """What a user waits for, in one table: `python -m tests.bench.all`; ten minutes on two processors.
 
-Each row has its cost here, and in the same run that of something known beside it: an empty Python, Z3 on the same table, nested ifs,
-a scan of all lines. Ratios hold on other machines too, seconds do not. Seconds are of the processor, so that a busy machine prints
+Each row has its cost here, and in the same run that of something known beside it: an empty Python, Z3 on the same table, a scan
+of all lines. Ratios hold on other machines too, seconds do not. Seconds are of the processor, so that a busy machine prints
 much the same; those of a command are of its whole process and all that it started. `-` is no answer within the limit of a row.
 """
 
@@ -235,19 +235,10 @@ def small_proofs() -> Iterator[Cost]:
 
 
 def matches() -> Iterator[Cost]:
-    """The matchers, C beside a scan in instructions, Python beside nested ifs in time."""
+    """The matchers in C, beside a scan."""
     for label, program in executors.programs():
         one = executors.measured(label, program)
         yield Cost(f"C match, {label}", f"{one.ours:.0f} instructions", "a scan", one.ours / one.scan)
-        timed = f"{one.timed.random:.1f} / {one.timed.steady:.1f} ns"
-        yield Cost(f"C match, {label}, random / steady", timed, f"an empty call: {one.timed.empty:.1f} ns")
-        if one.nested_ns is not None:
-            yield Cost(
-                f"Python match, {label}",
-                f"{one.python_ns:.0f} ns",
-                "nested ifs",
-                one.python_ns / one.nested_ns,
-            )
 
 
 def size(lines: int, variables: int) -> Cost:

@@ -20,7 +20,7 @@ from rcsc.proof.table.certificate import program_certificate
 from rcsc.proof.table.decide import prove_table
 from tests.bench.made import families
 from tests.bench.made.families import Fault
-from tests.bench.made.peers import installed
+from tests.bench.made.peers import PEERS
 
 SIZES = ((16, 7), (64, 7), (256, 7), (256, 20), (1024, 20), (1024, 50), (4096, 20))
 LARGE = ((16384, 20), (16384, 50))
@@ -79,7 +79,7 @@ def limited(seconds: float, work: Callable[..., str], *args: object) -> str:
 def peer_time(number: int, family: str, lines: int, variables: int) -> str:
     """Seconds that one peer takes."""
     program = compiled(getattr(families, family)(lines, variables, lines + variables))
-    peer = installed()[number]
+    peer = PEERS[number]
     begun = time.perf_counter()
     right = peer.decide(program, program.tables[0])
     spent = time.perf_counter() - begun
@@ -102,10 +102,9 @@ def main() -> None:
             print(limited(600, ours, "linear", lines, variables, fault, "boxes"), flush=True)
     if given.no_peers:
         return
-    peers = installed()
     print(
         "\nproof times in s; - is over the limit\n"
-        f"{'family':7}{'lines':>7}{'vars':>5}" + "".join(f"{p.name:>20}" for p in peers)
+        f"{'family':7}{'lines':>7}{'vars':>5}" + "".join(f"{p.name:>20}" for p in PEERS)
     )
     for family, sizes in (("box", SIZES), ("linear", LINEAR)):
         for lines, variables in sizes:
@@ -113,7 +112,7 @@ def main() -> None:
                 limited(given.limit, peer_time, at, family, lines, variables)
                 if peer.relational or family == "box"
                 else ""
-                for at, peer in enumerate(peers)
+                for at, peer in enumerate(PEERS)
             ]
             print(f"{family:7}{lines:7}{variables:5}" + "".join(f"{cell:>20}" for cell in cells), flush=True)
 

@@ -1,10 +1,8 @@
 """Other ways to decide a table: the same question to the same tables, each answer in its own words.
 
 Every peer takes a program and one of its tables (no DEFAULT, no assumptions) and returns whether it is exactly-one.
-A peer whose package is not installed is left out; what each installs as is in `PEERS`.
 """
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
@@ -18,15 +16,14 @@ Decide = Callable[[Program, Table], bool]
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """A way to decide, the package that it needs, and whether it takes conditions across variables."""
+    """A way to decide, and whether it takes conditions across variables."""
 
     name: str
-    package: str
     relational: bool
     decide: Decide
 
 
-# --- pairs and volume, no solver -----------------------------------------------------
+# --- masks and volume, no solver -----------------------------------------------------
 
 
 def line_boxes(program: Program, line: Line) -> dict[str, Box]:
@@ -45,32 +42,6 @@ def meet(one: Box, two: Box) -> Box:
     """What both sets of intervals contain."""
     both = ((max(a, c), min(b, d)) for a, b in one for c, d in two)
     return tuple(sorted((low, high) for low, high in both if low <= high))
-
-
-def python_pairs(program: Program, table: Table) -> bool:
-    """Every pair of lines by intersection of intervals; then the volumes."""
-    boxes = [line_boxes(program, line) for line in table.lines]
-    for one, two in combinations(boxes, 2):
-        if all(meet(one[name], two[name]) for name in one.keys() & two.keys()):
-            return False
-    return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
-
-
-def numpy_pairs(program: Program, table: Table) -> bool:
-    """The same with one lines-by-lines matrix of booleans."""
-    import numpy as np
-
-    boxes = [line_boxes(program, line) for line in table.lines]
-    meets = np.ones((len(boxes), len(boxes)), dtype=bool)
-    for name in table.variables:
-        keys = list(dict.fromkeys(box.get(name) for box in boxes))
-        distinct = {key: place for place, key in enumerate(keys)}
-        matrix = np.array([[a is None or b is None or bool(meet(a, b)) for b in keys] for a in keys])
-        index = np.array([distinct[box.get(name)] for box in boxes])
-        meets &= matrix[index[:, None], index[None, :]]
-    if int(meets.sum()) > len(boxes):
-        return False
-    return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
 
 
 def python_bitset(program: Program, table: Table) -> bool:
@@ -215,53 +186,8 @@ def z3_two_queries(program: Program, table: Table) -> bool:
     return bool(covered and solver.check() == z3.unsat)
 
 
-def _smt_text(program: Program, table: Table) -> tuple[str, str]:
-    """The two queries as SMT-LIB: the gap, and the overlap by a ladder."""
-    import z3
-
-    lines, domain = _z3_lines(program, table)
-    gap = z3.Solver()
-    gap.add(domain)
-    gap.add(z3.Not(z3.Or(lines)))
-    overlap = z3.Solver()
-    overlap.add(domain)
-    before: Any = z3.BoolVal(False)
-    twice = []
-    for number, line in enumerate(lines):
-        bit, seen = z3.Bool(f"line!{number}"), z3.Bool(f"seen!{number}")
-        overlap.add(bit == line, seen == z3.Or(before, bit))
-        twice.append(z3.And(before, bit))
-        before = seen
-    overlap.add(z3.Or(twice))
-    return gap.to_smt2(), overlap.to_smt2()
-
-
-def cvc5_two_queries(program: Program, table: Table) -> bool:
-    """cvc5 on the same two queries, as SMT-LIB."""
-    import cvc5
-
-    def unsatisfiable(text: str) -> bool:
-        solver = cvc5.Solver()
-        parser = cvc5.InputParser(solver)
-        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, "(set-logic ALL)\n" + text, "table")
-        answer = ""
-        while not (command := parser.nextCommand()).isNull():
-            answer = str(command.invoke(solver, parser.getSymbolManager())) or answer
-        return "unsat" in answer
-
-    return all(unsatisfiable(text) for text in _smt_text(program, table))
-
-
 PEERS = (
-    Peer("Python, all pairs", "", False, python_pairs),
-    Peer("Python, masks", "", False, python_bitset),
-    Peer("numpy, all pairs", "numpy", False, numpy_pairs),
-    Peer("Z3, all pairs", "z3", True, z3_all_pairs),
-    Peer("Z3, two queries", "z3", True, z3_two_queries),
-    Peer("cvc5, two queries", "cvc5", True, cvc5_two_queries),
+    Peer("Python, masks", False, python_bitset),
+    Peer("Z3, all pairs", True, z3_all_pairs),
+    Peer("Z3, two queries", True, z3_two_queries),
 )
-
-
-def installed() -> tuple[Peer, ...]:
-    """The peers whose packages are here."""
-    return tuple(peer for peer in PEERS if not peer.package or importlib.util.find_spec(peer.package))
