@@ -6,8 +6,8 @@ hierarchy, without the slips that its disagreement does not need. Exit status 1 
 What is compared, of every level of every hierarchy: the obligations themselves; each obligation that is *proved* with every reachable
 state; each trace that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That
 an obligation is *not proved* although it holds is counted (`incomplete`), and is no disagreement. A command that is shown to end may not
-go on for ever in any run. Where two neighbours agree, both run together with real buffers (`hierarchies_together`), and nothing that was
-proved of either may break. Every odd seed draws a whole system instead (`tests.whole_systems`): levels that declare their protocol or
+go on for ever in any run. All levels run together with real buffers (`whole_systems`), and nothing that was
+proved of any may break. Every odd seed draws a whole system instead (`tests.whole_systems`): levels that declare their protocol or
 write it, links, streams, plain buffers, facts, with refused inputs and results, and beginnings anew; each claim that is proved,
 whatever its sort, is held against what can happen to the levels together.
 """
@@ -22,40 +22,37 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 
-from rcsc.compose.contract.claims import ACCEPTED, SAFE, Closed, Need, closed
+from rcsc.compose.contract.claims import ACCEPTED, SAFE, STANDS, Closed, Need, closed
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.assume_guarantee import agreements, claims
-from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
+from rcsc.compose.proof.assume_guarantee import claims
+from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.lang.interpret import Fault
 from rcsc.proof.symbolic.values import TRUE
+from rcsc.run.description import description
 from tests.small_hierarchies.endless import edges, endless
 from tests.small_hierarchies.explored import Explored, TooManyError, explored
 from tests.small_hierarchies.level import EARLY, Again, Key, Reading, Role, State
 from tests.small_hierarchies.made import ODD, Hierarchy
 from tests.small_hierarchies.more import SLIPS, furnished
 from tests.small_hierarchies.text import files, written
-from tests.small_hierarchies.together import Pair, broken_together
 from tests.small_hierarchies.world import allowed, broken, wanted
 from tests.support.proved import shortest
 from tests.whole_systems.drawn import drawn
-from tests.whole_systems.held import held
+from tests.whole_systems.held import held, run_together
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST_CYCLES = 7
 """Of a trace that is looked for; longer ones are rare and cost much."""
-MOST_TOGETHER = 3000
-"""States of two levels together that are worth listing."""
-LIKELY = 4000
-"""Product of the states of two levels up to which those of both are likely to be fewer."""
+MOST_TOGETHER = 150
+"""States of all levels together that are gone on from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,14 +117,17 @@ def _compared(made: Hierarchy, seed: int, traces: int) -> Judged:
     counts: Counter[str] = Counter()
     random = Random(seed)  # noqa: S311  # repeatable on purpose
     with tempfile.TemporaryDirectory(prefix="rcsc-hierarchy-") as folder:
+        path = written(made, Path(folder))
         try:
-            made_systems = transition_systems(written(made, Path(folder)))
+            made_systems = transition_systems(path)
         except NoProgramError as error:
             if "can lie outside" not in str(error) and "can be zero" not in str(error):
                 raise
             return Judged(seed, Counter({"hierarchies": 1, "hierarchies that are refused": 1}))
+        system = description(path)
     known = {level.name: _known(made, level.name, made_systems) for level in made.levels}
-    follows = closed(claims(made_systems, {name: one.proof for name, one in known.items()}))
+    proofs = {name: one.proof for name, one in known.items()}
+    follows = closed(claims(made_systems, proofs))
     apart: list[Disagreement] = []
     incomplete: list[Disagreement] = []
     for one in known.values():
@@ -145,9 +145,17 @@ def _compared(made: Hierarchy, seed: int, traces: int) -> Judged:
     counts["hierarchies with a fault"] = int(
         any(k.truth and (k.truth.least or k.truth.restarted) for k in known.values())
     )
-    apart += _together(made, known, follows, counts)
+    if all(_comparable_together(one, known) for one in known.values()):
+        together = run_together(made_systems, system, follows, proofs, random, counts, MOST_TOGETHER)
+        # the report with which a level begins, which here may say *done*, answers nothing
+        apart += (Disagreement(*one) for one in together if one[2] != " ".join(STANDS))
     counts["hierarchies"] = 1
     return Judged(seed, counts, tuple(apart), tuple(incomplete))
+
+
+def _comparable_together(one: Known, known: Mapping[str, Known]) -> bool:
+    """Whether its numbers may have other names, which a level that computes with them would notice, and all that it orders is here."""
+    return not one.role.odd and all(below.name in known for below in one.role.links.below)
 
 
 def forget() -> None:
@@ -315,59 +323,6 @@ def _wrong(role: Role, obligation: Obligation, trace: Trace) -> str | None:
             return f"cycle {number} {'breaks' if broke else 'does not break'} it"
         now = ran.after
     return None
-
-
-# --- neighbours together ------------------------------------------------------------------------
-
-
-def _together(
-    made: Hierarchy, known: dict[str, Known], follows: Mapping[Need, Closed], counts: Counter[str]
-) -> Iterator[Disagreement]:
-    """Neighbours that agree, with real buffers."""
-    names = [level.name for level in made.levels]
-    agreed = agreements({n: k.ts for n, k in known.items()}, {n: k.proof for n, k in known.items()})
-    for above, below in pairwise(names):
-        both = {(above, f"proved of `{below}`"), (below, f"proved of `{above}`")}
-        holds = all(one.holds for one in agreed if (one.level, one.reason.split(":")[0]) in both)
-        open_ = [
-            obligation.name for obligation in known[above].proof.open if obligation.sort is Sort.NUMBERED
-        ]
-        if not holds or any(name.endswith(".input_command") for name in open_):
-            counts["pairs that do not agree"] += 1
-            continue
-        upper, lower = known[above], known[below]
-        if upper.truth is None or lower.truth is None or upper.truth.states * lower.truth.states > LIKELY:
-            counts["pairs with too many states"] += 1
-            continue
-        if upper.truth.undefined or lower.truth.undefined:
-            counts["pairs that compute what is not defined"] += 1
-            continue
-        yield from _pair(upper, lower, follows, counts, restarts=len(names) == 2)
-
-
-def _pair(
-    upper: Known, lower: Known, follows: Mapping[Need, Closed], counts: Counter[str], *, restarts: bool
-) -> Iterator[Disagreement]:
-    above, below = _proved(upper.proof, follows), _proved(lower.proof, follows)
-    pair = Pair(upper.role, lower.role, above, below, restarts)
-    try:
-        said, states = broken_together(pair, most=MOST_TOGETHER)
-    except TooManyError:
-        counts["pairs with too many states"] += 1
-        return
-    counts["pairs together"] += 1
-    counts["states together"] += states
-    for words in said:
-        yield Disagreement("breaks together", upper.proof.level, words)
-
-
-def _proved(proof: LevelProof, follows: Mapping[Need, Closed]) -> frozenset[Key]:
-    """What is found so where it has to rest on the contract alone, too: the two break nothing of it."""
-    return frozenset(
-        key_of(obligation)
-        for obligation, verdict in proof.verdicts
-        if verdict is Verdict.PROVED or follows[proof.level, obligation.key].proved
-    )
 
 
 # --- the command --------------------------------------------------------------------------------

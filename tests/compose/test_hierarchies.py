@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-from rcsc.compose.contract.claims import Claim, Closed, Need, closed
+from rcsc.compose.contract.claims import CONTRACT, UNREACHED, Claim, Closed, Need, closed
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
@@ -21,15 +21,17 @@ from rcsc.proof.symbolic.execution import Run
 from tests import hierarchies
 from tests.bench.growth import chain, costs
 from tests.hierarchies import Judged, forget, judged
-from tests.small_hierarchies import together, world
+from tests.small_hierarchies import world
 from tests.small_hierarchies.explored import TooManyError, adopted, explored
 from tests.small_hierarchies.level import Role
 from tests.small_hierarchies.made import ODD, RIGHT, WRONG, Hierarchy, hierarchy
 from tests.small_hierarchies.more import EVERY, furnished
 from tests.small_hierarchies.text import files, written
-from tests.small_hierarchies.together import Pair, broken_together
 from tests.small_hierarchies.world import canonical, offers, wanted
 from tests.support.proved import shortest
+from tests.whole_systems import part, whole
+from tests.whole_systems.held import everything
+from tests.whole_systems.part import Event
 
 LITTLE = 9
 """Lines of the tables of a hierarchy that is quickly judged."""
@@ -76,7 +78,7 @@ def test_the_proof_and_the_enumeration_agree_of_random_hierarchies() -> None:
     assert counts["not proved, breaks"] > 10
     assert counts["proved, holds"] > 10 * counts["not proved, holds"]
     assert counts["traces"] > 10
-    assert counts["pairs together"] > 0
+    assert counts["whole systems"] > 0
 
 
 def test_the_command_taken_last_is_remembered_though_no_number_tells_it(tmp_path: Path) -> None:
@@ -270,34 +272,33 @@ def test_hierarchies_have_all_that_is_to_be_judged() -> None:
 # --- together -------------------------------------------------------------------------------
 
 
-def pair(made: Hierarchy, folder: Path) -> Pair:
-    """Both levels, everything claimed of them."""
-    known = roles(made, folder)
-    return Pair(known["l0"], known["l1"], wanted(known["l0"]), wanted(known["l1"]))
+def broken_together(made: Hierarchy, folder: Path) -> set[tuple[int, str]]:
+    """What breaks where its levels run with real buffers and begin anew: the level, and the sort of the claim."""
+    found = everything(files(made), folder, most=1500)
+    return {
+        (level, key[0])
+        for level, key, rank in found.broken
+        if key[0] != UNREACHED and rank != Event.REFUSED.rank
+    }
 
 
 def test_two_levels_with_real_buffers_keep_what_they_keep_in_their_contracts(tmp_path: Path) -> None:
-    said_, states = broken_together(pair(plain(), tmp_path), most=20_000)
-    assert said_ == []
-    assert states > 500
+    assert broken_together(plain(), tmp_path) == set()
 
 
 @pytest.mark.parametrize(
     ("level", "name", "text", "breaks"),
     [
-        (0, "numbered", "new_command", "the contract about the subordinate"),
-        (0, "numbered", "COMMAND /= old_command and new_command", "the contract about"),
-        (1, "echoed", "report.ref_command_echo := pause", "the contract about the subordinate"),
-        (0, "released", "begun", "l0: DEFAULT is not reached"),
+        (0, "numbered", "new_command", (0, CONTRACT)),
+        (0, "numbered", "COMMAND /= old_command and new_command", (1, CONTRACT)),
+        (1, "echoed", "report.ref_command_echo := pause", (0, CONTRACT)),
+        (0, "released", "begun", (0, Sort.NO_DEFAULT)),
     ],
 )
 def test_levels_that_do_not_keep_their_guarantees_break_something_together(
-    level: int, name: str, text: str, breaks: str, tmp_path: Path
+    level: int, name: str, text: str, breaks: tuple[int, str], tmp_path: Path
 ) -> None:
-    both = pair(said(plain(), level, **{name: text}), tmp_path)
-    claimed = frozenset(key for key in both.claimed_upper if key[0] is Sort.NO_DEFAULT)
-    found, _ = broken_together(replace(both, claimed_upper=claimed, claimed_lower=frozenset()), most=20_000)
-    assert any(one.startswith(breaks) for one in found), found
+    assert breaks in broken_together(said(plain(), level, **{name: text}), tmp_path)
 
 
 def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
@@ -306,11 +307,11 @@ def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
     """That a report goes on echoing is needed: else the one that stood is followed by an older one."""
     upper, lower = saying("slow", "load", "assume loaded monitored : load /= 0").levels
     tables = tuple(replace(table, assuming=("loaded",)) for table in lower.tables)
-    both = pair(Hierarchy((upper, replace(lower, tables=tables))), tmp_path)
-    both = replace(both, claimed_upper=frozenset(), claimed_lower=frozenset())
-    assert broken_together(both, most=20_000)[0] == []
-    monkeypatch.setattr(together, "adopted", lambda role, start, *_: adopted(role, start))
-    assert broken_together(both, most=20_000)[0] == ["the contract about the subordinate"]
+    made = Hierarchy((upper, replace(lower, tables=tables)))
+    monkeypatch.setattr(whole, "SHARE", (0.1, 0.3, 0.3, 1.0))  # most of all what ends early behind a restart
+    assert (0, CONTRACT) not in broken_together(made, tmp_path)
+    monkeypatch.setattr(part, "adopted", lambda role, start, *_: adopted(role, start))
+    assert (0, CONTRACT) in broken_together(made, tmp_path)
 
 
 # --- growth ---------------------------------------------------------------------------------

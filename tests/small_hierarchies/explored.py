@@ -196,17 +196,13 @@ def _new(role: Role, ran: Ran, seen: set[State]) -> dict[str, Value] | None:
 
 
 def successors(
-    role: Role,
-    before: Mapping[str, Value],
-    but: str = "",
-    given: Mapping[str, Value] | None = None,
-    also: frozenset[str] = frozenset(),
+    role: Role, before: Mapping[str, Value], also: frozenset[str] = frozenset()
 ) -> Iterator[tuple[dict[str, Value], Ran]]:
     """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`), but for those in `also`.
 
     Where what the tables are declared to rely on is not so, there is no such cycle.
     """
-    left = offers(role, before, but, given)
+    left = offers(role, before)
     while left:
         taken = dict(zip(role.inputs, left[0], strict=True))
         read: set[str] = set()

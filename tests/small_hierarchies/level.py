@@ -109,7 +109,6 @@ class Script:
     given: list[Result] = field(default_factory=list)
 
     def __call__(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
-        """Answers a call."""
         every = self.role.results[str(procedure.name)]
         at = len(self.taken)
         self.taken.append(self.numbers[at] if at < len(self.numbers) else 0)
@@ -146,7 +145,6 @@ class Again:
     given: list[Result]
 
     def __call__(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
-        """Answers a call."""
         for at, (name, values) in enumerate(self.given):
             if name == procedure.name:
                 del self.given[at]
@@ -172,7 +170,6 @@ class Role:
 
     @cached_property
     def leaves(self) -> tuple[str, ...]:
-        """Every leaf, in declared order."""
         return tuple(str(v.name) for v in self.program.variables)
 
     @cached_property
@@ -241,7 +238,6 @@ class Role:
 
     @cached_property
     def tables(self) -> dict[str, Table]:
-        """Tables by name."""
         return {str(table.name): table for table in self.program.tables}
 
     @cached_property
@@ -258,7 +254,6 @@ class Role:
 
     @cached_property
     def report(self) -> tuple[str, ...]:
-        """The leaves of its report."""
         above = self.links.above
         return (
             ()
@@ -303,7 +298,6 @@ class Role:
 
     @cached_property
     def compiled(self) -> Compiled:
-        """Its cycle as Python functions."""
         owes, given = self.links.owes, self.links.given
         between = *(fact.condition for fact in owes), *(fact.condition for fact in given)
         return compiled(self.program, self.level, between)

@@ -65,7 +65,6 @@ def _stages(made: Hierarchy) -> str:
 
 
 def program(level: MadeLevel) -> str:
-    """The program of a level."""
     said = {name: _meant(text, level.below) for name, text in level.said}
     parts = [_declared(level, said), _modules(level, said), _procedures(level)]
     parts += [_table(table, level) for table in level.tables]

@@ -26,14 +26,13 @@ NEAR = (NUMBERS - 2, NUMBERS - 1, 2)
 # --- the contract -------------------------------------------------------------------------------
 
 
-def allowed(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], but: str = "") -> bool:
-    """Whether the environment may give these inputs after this state; of the record `but` nothing is asked."""
-    above = role.links.above
-    if above is not None and above.order != but and not ordered(role, before, taken):
+def allowed(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
+    """Whether the environment may give these inputs after this state."""
+    if role.links.above is not None and not ordered(role, before, taken):
         return False
-    if not all(owed(taken) for record, owed in facts(role) if record != but):
+    if not all(owed(taken) for _, owed in facts(role)):
         return False
-    return all(answered(below, before, taken) for below in role.links.below if below.report != but)
+    return all(answered(below, before, taken) for below in role.links.below)
 
 
 def facts(role: Role) -> Iterator[tuple[str, Callable[[Mapping[str, Value]], bool]]]:
@@ -66,28 +65,25 @@ def answered(below: Below, before: Mapping[str, Value], taken: Mapping[str, Valu
     return before[f"{below.report}.inc_command_echo"] != sent  # (3) what is echoed stays echoed
 
 
-def offers(
-    role: Role, before: Mapping[str, Value], but: str = "", given: Mapping[str, Value] | None = None
-) -> list[tuple[Value, ...]]:
-    """Every input that the environment may give after a state, numbers up to their names; the record `but` is given."""
-    given = given or {}
+def offers(role: Role, before: Mapping[str, Value]) -> list[tuple[Value, ...]]:
+    """Every input that the environment may give after a state, numbers up to their names."""
     records = []
     for leaves in role.taken:
-        choices = [(given[leaf],) if leaf in given else _choices(role, leaf, before) for leaf in leaves]
+        choices = [_choices(role, leaf, before) for leaf in leaves]
         kept = (dict(zip(leaves, values, strict=True)) for values in product(*choices))
-        records.append([tuple(one.values()) for one in kept if _fits(role, before, one, but)])
+        records.append([tuple(one.values()) for one in kept if _fits(role, before, one)])
     return [tuple(chain.from_iterable(values)) for values in product(*records)]
 
 
-def _fits(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], but: str) -> bool:
+def _fits(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
     """Whether the environment may give this record, of which alone it is asked (`allowed`)."""
     record = next(iter(taken)).partition(".")[0]
     above = role.links.above
-    if record != but and not all(owed(taken) for about, owed in facts(role) if about == record):
+    if not all(owed(taken) for about, owed in facts(role) if about == record):
         return False
-    if above is not None and record == above.order and record != but:
+    if above is not None and record == above.order:
         return ordered(role, before, taken)
-    reports = [below for below in role.links.below if below.report == record != but]
+    reports = [below for below in role.links.below if below.report == record]
     return all(answered(below, before, taken) for below in reports)
 
 
@@ -113,14 +109,13 @@ def given_numbers(role: Role) -> tuple[str, ...]:
     return (f"{above.order}.inc_command", "inc_command_seen", f"{above.report}.inc_command_echo")
 
 
-def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str, Value]:
-    """The same state with the first names for its numbers, but for those exchanged with `but`, and without inputs that nobody remembers."""
+def canonical(role: Role, state: Mapping[str, Value]) -> dict[str, Value]:
+    """The same state with the first names for its numbers, and without inputs that nobody remembers."""
     found = {**state, **role.forgotten}
     names: dict[Value, int] = {}
     for leaf in given_numbers(role):
-        if role.links.above is not None and role.links.above.name != but:
-            found[leaf] = names.setdefault(found[leaf], len(names))
-    for below in (lower for lower in role.links.below if lower.name != but):
+        found[leaf] = names.setdefault(found[leaf], len(names))
+    for below in role.links.below:
         sent, echo = f"{below.order}.inc_command", f"{below.report}.inc_command_echo"
         found[echo] = 0 if found[echo] == found[sent] else FAR
         found[sent] = 0
@@ -131,7 +126,6 @@ def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str
 
 
 def wanted(role: Role) -> frozenset[Key]:
-    """Every obligation of a level."""
     found: set[Key] = set()
     chosen = role.level.tables
     tables = (chosen.table,) if isinstance(chosen, OneTable) else tuple(name for _, name in chosen.tables)

@@ -28,7 +28,6 @@ KINDS = frozenset(
 
 
 def drawn(seed: int) -> Drawn:
-    """The system of this seed."""
     random = Random(f"whole {seed}")  # noqa: S311  # repeatable on purpose
     shape = random.choices(("alone", "chain of two", "chain of three", "two subordinates"), (3, 6, 2, 2))[0]
     return alone(random) if shape == "alone" else _several(shape, random)

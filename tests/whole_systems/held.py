@@ -37,7 +37,7 @@ from tests.small_hierarchies.level import Role
 from tests.whole_systems.link import Drawn
 from tests.whole_systems.part import Owed, Part
 from tests.whole_systems.rounds import goes_on
-from tests.whole_systems.whole import Ends, Whole, Wire, searched
+from tests.whole_systems.whole import Ends, Searched, Whole, Wire, searched
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST = 400
@@ -109,6 +109,19 @@ def _compared(
     proofs = {name: _proof(made, name, ts) for name, ts in systems.items()}
     follows = closed(claims(systems, proofs))
     yield from _unknown(follows)
+    yield from run_together(systems, system, follows, proofs, random, counts, most)
+
+
+def run_together(
+    systems: Mapping[str, TransitionSystem],
+    system: Description,
+    follows: Mapping[Need, Closed],
+    proofs: Mapping[str, LevelProof],
+    random: Random,
+    counts: Counter[str],
+    most: int,
+) -> Iterator[tuple[str, str, str, str]]:
+    """What is proved of a system and breaks in its runs: as `held` says it."""
     whole = assembled(systems, system, follows, proofs)
     found = searched(whole, random, most)
     names = list(systems)
@@ -131,6 +144,15 @@ def _compared(
             counts["endings of whole systems"] += 1
             if goes_on(whole, found, level, table, still, *ranks):
                 yield "shown to end, but goes on in the whole", names[level], table, ", ".join(sorted(still))
+
+
+def everything(files: Mapping[str, str], folder: Path, most: int = 300) -> Searched:
+    """What happens to a system, whatever is claimed of it."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    path = folder / "system.toml"
+    whole = assembled(transition_systems(path), description(path), {}, {})
+    return searched(whole, Random(0), most)  # noqa: S311  # repeatable
 
 
 def _compares(error: Exception) -> bool:

@@ -26,12 +26,10 @@ class Link:
 
     @property
     def name(self) -> str:
-        """Its name."""
         return f"k{self.at}"
 
     @property
     def rest(self) -> str:
-        """The command that rests."""
         return self.commands[0]
 
     @property

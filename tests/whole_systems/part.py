@@ -40,7 +40,6 @@ class Event(Choice):
 
     @property
     def rank(self) -> int:
-        """Its rank."""
         return int(self.value[1])
 
 
@@ -110,7 +109,6 @@ class Part:
 
     @cached_property
     def program(self) -> Program:
-        """Its program."""
         return self.role.program
 
     @cached_property

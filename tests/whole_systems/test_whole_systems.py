@@ -3,15 +3,12 @@
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from random import Random
 
 import pytest
 
 from rcsc.compose.contract import claims as of_claims
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.proof.system import transition_systems
 from rcsc.lang.interpret import Fault
-from rcsc.run.description import description
 from tests.small_hierarchies.level import EARLY
 from tests.whole_systems import part as of_part
 from tests.whole_systems.drawn import KINDS, drawn
@@ -20,14 +17,12 @@ from tests.whole_systems.held import (
     COMPARED_BESIDES,
     LEFT_OUT,
     LEFT_OUT_BESIDES,
-    assembled,
+    everything,
     forget,
     held,
     speaks_of,
 )
-from tests.whole_systems.link import Drawn
 from tests.whole_systems.part import Event
-from tests.whole_systems.whole import Searched, searched
 
 AGREED = (2, 4, 5, 10, 19, 29, 32, 38, 42, 48, 51, 57, 58)
 """Seeds that show every kind, and are quickly judged."""
@@ -117,18 +112,8 @@ level a { period 40 [ms] table t }
 """
 
 
-def everything(made: Drawn, folder: Path) -> Searched:
-    """What happens to a system, whatever is claimed of it."""
-    for name, text in made.files:
-        (folder / name).write_text(text, encoding="utf-8")
-    systems = transition_systems(folder / "system.toml")
-    whole = assembled(systems, description(folder / "system.toml"), {}, {})
-    return searched(whole, Random(0), 300)  # noqa: S311  # repeatable on purpose
-
-
 def test_a_safe_value_that_a_refused_input_shows_is_seen_by_the_next_cycle(tmp_path: Path) -> None:
-    made = Drawn((("system.toml", ALONE), ("a.rcs", SHOWN)), "", frozenset(), ())
-    found = everything(made, tmp_path)
+    found = everything({"system.toml": ALONE, "a.rcs": SHOWN}, tmp_path)
     assert found.whole
     assert {(key, rank) for _, key, rank in found.broken if key[0] in {Sort.SOME_LINE, Sort.ASSUMPTION}} == {
         ((Sort.SOME_LINE, "t", ""), Event.REFUSED.rank),

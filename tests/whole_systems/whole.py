@@ -50,7 +50,6 @@ class Now:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """To compare it by."""
         return self.levels, self.stands, self.seen
 
 
