@@ -3,7 +3,9 @@
 The oracle is the edit: each does one known thing to one file of a project that passes without it.
 """
 
+import contextlib
 import re
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -33,19 +35,27 @@ level l {
 Edit = Callable[[Path], None]
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("compiled")
+    (folder / "a.rcs").write_text(TABLE)
+    with contextlib.chdir(folder):
+        assert run(["compile", "-q", "a.rcs"]) == 0
+    return folder
+
+
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def project(compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A compiled project, in which the test stands."""
+    shutil.copytree(compiled, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.rcs").write_text(TABLE)
-    assert run(["compile", "-q", "a.rcs"]) == 0
     return tmp_path
 
 
 def outcome(capsys: pytest.CaptureFixture[str], *options: str) -> tuple[int, str]:
     """The status and the text of a short `rcsc test`."""
     capsys.readouterr()
-    status = run(["test", "--examples", "8", "--mutants", "0", "--no-cortex", *options, "a.rcs"])
+    status = run(["test", "--examples", "4", "--mutants", "0", "--no-cortex", *options, "a.rcs"])
     return status, "".join(capsys.readouterr())
 
 

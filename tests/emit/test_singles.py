@@ -77,14 +77,8 @@ def test_c_promotes_nothing_to_double(text: str, doubles: bool, tmp_path: Path) 
     write(emitted(program_of(text)), str(tmp_path))
     [source] = (tmp_path / "c").glob("*.c")
     command = [
-        str(c_compiler()),
-        "-std=c99",
-        *WARNINGS.split(),
-        "-c",
-        str(source),
-        "-o",
-        str(tmp_path / "out.o"),
-    ]
+        str(c_compiler()), "-std=c99", *WARNINGS.split(), "-c", str(source), "-o", str(tmp_path / "out.o"),
+    ]  # fmt: skip
     made = subprocess.run(command, capture_output=True, text=True, check=False)
     assert made.returncode == 0, made.stderr
     assert ("double" in source.read_text()) == doubles

@@ -10,18 +10,8 @@ from rcsc.code.emit import TARGETS
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Conclusion, Settings
 from rcsc.proof.solvers.options import Options
-from tests.support.programs.stages import emitted, program_of
+from tests.support.programs.stages import STRICT, emitted, program_of
 
-STRICT = (
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wsign-conversion",
-    "-Wshadow",
-    "-Wpedantic",
-    "-Werror",
-)
 TABLE = "table t {\n| line | a     ||\n| x    | true  ||\n| y    | false ||\n}\n"
 USER = f"use words\ninput a : bool\ninput o : order\noutput r : order\n{TABLE}level LEVEL {{ period 10 [ms] table t }}\n"
 WORDS = "enum word {{ rest, go }}\nrecord order {{ what : word  many : array[3] of int 0 .. {most} }}\n"

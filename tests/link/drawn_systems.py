@@ -12,16 +12,9 @@ from rcsc.lang.restart import NUMBERED
 from tests.support.programs.texts import system
 
 PERIODS = (
-    (10, 10),
-    (10, 20),
-    (30, 10),
-    (20, 30),
-    (10, 10, 10),
-    (10, 20, 40),
-    (40, 10, 20),
-    (30, 20, 10),
+    (10, 10), (10, 20), (30, 10), (20, 30), (10, 10, 10), (10, 20, 40), (40, 10, 20), (30, 20, 10),
     (20, 20, 50),
-)
+)  # fmt: skip
 RANGES = ("int 0 .. 200", "int -3 .. 90", "int 7 .. 7", "int -70000 .. 70000", "int 0 .. 18446744073709551615",
           "real -1.5 .. 2.5", "bool", "job", "array[2] of int 0 .. 3", "array[2] of array[2] of bool", "pair")  # fmt: skip
 
@@ -120,7 +113,6 @@ def drawn_system(folder: Path, random: Random, *, most: int = 0) -> Path:
 
 
 def level_text(random: Random, name: str, period: int, kind: str, most: int, *, last: bool) -> str:
-    """The program of a level."""
     invariant = random.choice(("", "", "invariant never : mine.first <= 12"))
     numeric = kind.startswith(("int", "real"))
     return LEVEL.format(

@@ -40,7 +40,6 @@ class Told:
 def by_python(
     system: Description, ticks: Sequence[Tick], queries: Mapping[str, Query] | None = None
 ) -> list[Seen]:
-    """What the Python system does."""
     told = Told()
     running = assemble(system, "python", queries or {}, [told])
     history: list[dict[str, Values]] = []
@@ -191,12 +190,10 @@ class CSystem:
         return f"{head} {{ double got[{len(leaves)}]; const double keys[] = {{{keys}}}; seen_ask({at}, keys, got); {sets}}}\n"
 
     def play(self, ticks: Sequence[Tick]) -> list[Seen]:
-        """What the C system does."""
         return self._played(self._linked(self.text, FLAGS), ticks, self.word)
 
     @property
     def text(self) -> str:
-        """Its source."""
         return (self.system.generated / f"c/{self.word}.c").read_text(encoding="utf-8")
 
     def play_mutants(

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from rcsc.code.testing.boards import BOARDS
+from tests.support.programs.stages import STRICT
 
 GUIDE = Path(__file__).parents[2] / "tables/README.md"
-STRICT = "-std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wpedantic -Werror".split()
-
 PRINTED = "status 0 at 628 mm\n"
 
 
@@ -67,7 +66,7 @@ def test_by_cmake(robot: Path) -> None:
 )
 def test_by_pkg_config(build: str, robot: Path) -> None:
     compiler = f"cc {' '.join(STRICT)} "
-    script = f"export PKG_CONFIG_PATH=generated/c\n{build.replace('cc ', compiler)}\n./robot"
+    script = f"export PKG_CONFIG_PATH=generated/c\npkg-config --validate drive supervisor\n{build.replace('cc ', compiler)}\n./robot"
     assert sh(robot, script) == PRINTED
 
 

@@ -10,18 +10,9 @@ from rcsc.run.description import description
 from rcsc.run.link.drawn_script import drawing, script
 from rcsc.run.system import signatures
 from tests.link.played import CSystem, by_python, first_difference
+from tests.support.programs.stages import STRICT
 from tests.support.programs.texts import edit_file, system
 
-STRICT = (
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wsign-conversion",
-    "-Wshadow",
-    "-Wpedantic",
-    "-Werror",
-)
 PROGRAM = """
 record r {{ a : int 0 .. 9  b : array[2] of bool }}
 input {x} : int 0 .. 9

@@ -86,17 +86,9 @@ int main()
         words = ["cc", "-std=c99", *STRICT, "-c", f"{folder / name}.c", "-o", f"{name}.o"]
         subprocess.run(words, cwd=tmp_path, check=True)
     words = [
-        "c++",
-        "-std=c++11",
-        *STRICT,
-        f"-I{old}",
-        f"-I{new}",
-        "main.cpp",
-        "v1_belt.o",
-        "v2_belt.o",
-        "-o",
+        "c++", "-std=c++11", *STRICT, f"-I{old}", f"-I{new}", "main.cpp", "v1_belt.o", "v2_belt.o", "-o",
         "main",
-    ]
+    ]  # fmt: skip
     subprocess.run(words, cwd=tmp_path, check=True)
     subprocess.run(["./main"], cwd=tmp_path, check=True)
 
@@ -174,14 +166,8 @@ def test_an_image_carries_the_tables_that_it_steps(repo: Path, tmp_path: Path) -
     bytes_ = []
     for flags in ((), ("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")):
         words = [
-            "arm-none-eabi-gcc",
-            "-std=c99",
-            "-Os",
-            "-mcpu=cortex-m3",
-            "-mthumb",
-            "-ffreestanding",
-            *flags,
-        ]
+            "arm-none-eabi-gcc", "-std=c99", "-Os", "-mcpu=cortex-m3", "-mthumb", "-ffreestanding", *flags,
+        ]  # fmt: skip
         words += [f"-I{repo / 'generated/c'}", "main.c", str(repo / "generated/c/task.c")]
         subprocess.run([*words, "-nostdlib", "-lgcc", "-Wl,-e,main", "-o", "image"], cwd=tmp_path, check=True)
         size = subprocess.run(

@@ -231,15 +231,7 @@ def test_the_size_is_what_the_header_says(command: tuple[str, ...], repo: Path, 
         )
         (tmp_path / f"wrong_{header.name}").write_text(wrong)
         for name, right in ((header.name, True), (f"wrong_{header.name}", False)):
-            strict = [
-                "-std=c99",
-                "-ffreestanding",
-                "-fsyntax-only",
-                "-Wall",
-                "-Wextra",
-                "-Wpedantic",
-                "-Werror",
-            ]
+            strict = "-std=c99 -ffreestanding -fsyntax-only -Wall -Wextra -Wpedantic -Werror".split()
             words = [compiler, *flags, *strict, f"-I{repo / 'generated/c'}", "-x", "c", name]
             ran = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
             assert (ran.returncode == 0) is right, ran.stderr

@@ -167,7 +167,7 @@ def test_lines_are_short(name: str) -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("program", ["task", "gripper", "approach"])
 def test_nothing_is_copied_and_only_the_compilers_library_is_called(program: str, tmp_path: Path) -> None:
     """A frame as large as the state would be a copy of it; what is called stands in the header."""
     flags = ("-std=c99", "-Os", "-fno-stack-protector", "-fstack-usage", f"-I{GENERATED}")

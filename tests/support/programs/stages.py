@@ -21,6 +21,8 @@ from rcsc.proof.table.program import ProgramVerdict, prove_program
 
 BOXES = Options(solver="boxes")
 """Decides tables by boxes where it can: the quickest."""
+STRICT = tuple("-std=c99 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wpedantic -Werror".split())
+"""Of a C compiler that is to have nothing to say of generated C."""
 
 
 def program_of(text: str, file: str = "case.rcs") -> Program:
