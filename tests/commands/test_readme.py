@@ -20,13 +20,8 @@ from tests.picture import CHECK, PICTURE_OF, PICTURES, RUN, masked, printed
 
 REPO = Path(__file__).parents[2]
 GUIDES = (
-    "README.md",
-    "rcsc/README.md",
-    "tables/README.md",
-    "tables/system.md",
-    "tables/studio.md",
-    "sim/README.md",
-)
+    "README.md", "rcsc/README.md", "tables/README.md", "tables/system.md", "tables/studio.md", "sim/README.md",
+)  # fmt: skip
 GALLERY_PAGES = sorted(path.relative_to(REPO) for path in (REPO / "tables/gallery").rglob("README.md"))
 TINY = {
     "rcsc run make_boxt --executor python": "rcsc run --help",
@@ -64,7 +59,6 @@ TINY = {
 
 
 def text_of(guide: str) -> str:
-    """A guide."""
     return (REPO / guide).read_text(encoding="utf-8")
 
 
@@ -185,6 +179,7 @@ def test_the_picture_of_a_finding_is_fresh() -> None:
     assert masked(drawn) == masked(PICTURE_OF["first_minute.svg"]()), "run `python -m tests.picture`"
 
 
+@pytest.mark.usefixtures("kept_proofs")
 def test_the_picture_of_the_robot_is_fresh_but_for_what_hangs_on_the_machine() -> None:
     """The same things in the same colours, nowhere more than a hundredth of a picture away."""
     kept, drawn = (PICTURES / "make_boxt.svg").read_text(encoding="utf-8"), PICTURE_OF["make_boxt.svg"]()
@@ -211,6 +206,7 @@ def test_the_first_table_is_the_example() -> None:
         assert words(line) in words(example), line
 
 
+@pytest.mark.usefixtures("kept_proofs")
 def test_what_the_commands_print_is_shown_as_it_is() -> None:
     shown = blocks("README.md", "text")
     commands_ = (RUN, (*CHECK[:-1], "tables/examples/acquire_published.rcs"))

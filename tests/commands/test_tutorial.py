@@ -69,7 +69,6 @@ class Reader:
         self.capfd, self.said = capfd, ""
 
     def follow(self, block: Block) -> None:
-        """Do what a block says."""
         if block.kind == "sh":
             self.said = ""
             for line in block.text.splitlines():
