@@ -1,5 +1,6 @@
 """The interactive shell: from outside as a user drives it, and through its session."""
 
+import io
 import os
 import pty
 import shutil
@@ -17,6 +18,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.desk.shell.commands import HELP, Commands
 from rcsc.desk.shell.reload.reload import Origin, kept, laid_out
 from rcsc.desk.shell.session import Session
+from rcsc.front.commands import run as in_process
 from rcsc.front.commands.group import commands as group
 from rcsc.run.adopt import Begun
 from rcsc.run.description import description
@@ -87,35 +89,42 @@ def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None
     assert done.stdout.splitlines()[-1].endswith(": line task.move.13")
 
 
-def test_a_script_stops_at_the_first_command_that_fails(tmp_path: Path) -> None:
-    text = "step 2\nexpect task.emove.resting = false\nstep 3\n"
-    done = script(text, "--alone", "--executor", "python", tmp_path=tmp_path)
-    assert done.returncode == 1
-    assert "cycle 2" in done.stdout
-    assert "cycle 5" not in done.stdout
-    assert (
-        done.stderr
-        == f"{tmp_path}/script.txt:2: error[RCS736]: `task.emove.resting = false` does not hold: task.emove.resting = true\n"
-    )
+def test_a_script_stops_at_the_first_command_that_fails(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "script.txt"
+    path.write_text("step 2\nexpect task.emove.resting = false\nstep 3\n", encoding="utf-8")
+    status, out, err = within(capfd, "--script", str(path))
+    assert status == 1
+    assert "cycle 2" in out
+    assert "cycle 5" not in out
+    said = "`task.emove.resting = false` does not hold: task.emove.resting = true"
+    assert err == f"{path}:2: error[RCS736]: {said}\n"
 
 
 def test_commands_from_a_pipe_end_with_quit() -> None:
-    done = run("--alone", stdin="step\nquit\nnonsense\n")
+    done = run("--alone", "--executor", "python", stdin="step\nquit\nnonsense\n")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("cycle 1: task.pause_task.1")
 
 
-def test_wrong_usage_is_2_and_a_wrong_system_is_1(tmp_path: Path) -> None:
-    assert run("--script", "no such file").returncode == 2
-    assert run("--executor", "fortran").returncode == 2
+def test_wrong_usage_is_2_and_a_wrong_system_is_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert in_process(["shell", "--script", "no such file"]) == 2
+    assert in_process(["shell", "--executor", "fortran"]) == 2
     bad = tmp_path / "system.toml"
     bad.write_text("name = 1", encoding="utf-8")
-    done = run(str(bad))
-    assert done.returncode == 1
-    assert "error[RCS721]" in done.stderr
+    assert in_process(["shell", str(bad)]) == 1
+    assert "error[RCS721]" in capfd.readouterr().err
 
 
-def test_a_script_is_a_text_of_bounded_size(tmp_path: Path) -> None:
+def within(capfd: pytest.CaptureFixture[str], *args: str) -> tuple[int, str, str]:
+    """The same in this process, with levels in Python and nothing outside."""
+    capfd.readouterr()
+    status = in_process(["shell", str(SYSTEM), "--alone", "--executor", "python", *args])
+    return status, *capfd.readouterr()
+
+
+def test_a_script_is_a_text_of_bounded_size(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "bytes").write_bytes(b"step\n\xff\n")
@@ -128,23 +137,26 @@ def test_a_script_is_a_text_of_bounded_size(tmp_path: Path) -> None:
         "large": "64 MiB",
     }
     for name, why in whys.items():
-        done = run("--alone", "--executor", "python", "--script", str(tmp_path / name))
-        assert (done.returncode, done.stdout) == (1, "")
-        assert "error[RCS723]" in done.stderr
-        assert why in done.stderr
+        status, out, err = within(capfd, "--script", str(tmp_path / name))
+        assert (status, out) == (1, "")
+        assert "error[RCS723]" in err
+        assert why in err
 
 
-def test_bytes_that_are_no_text_end_the_shell_in_order() -> None:
-    command = [*RCSC, "--alone", "--executor", "python"]
-    for said, why in (
-        (b"step\n\xff\n", "UTF-8 in line 2"),
-        (b"step\n" + b"x" * 100_000, "line 2 of more than"),
-    ):
-        done = subprocess.run(command, cwd=REPO, input=said, capture_output=True, check=False)
-        assert done.returncode == 1
-        assert done.stdout.startswith(b"cycle 1")
-        assert why in done.stderr.decode()
-        assert b"error[RCS723]" in done.stderr
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [(b"\xff\n", "UTF-8 in line 2"), (b"x" * 100_000, "line 2 of more than")],
+    ids=["bytes", "long"],
+)
+def test_bytes_that_are_no_text_end_the_shell_in_order(
+    said: bytes, why: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"step\n" + said)))
+    status, out, err = within(capfd)
+    assert status == 1
+    assert out.startswith("cycle 1")
+    assert why in err
+    assert "error[RCS723]" in err
 
 
 def test_a_script_is_interrupted_between_cycles(tmp_path: Path) -> None:
@@ -391,8 +403,8 @@ def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
     """The interpreter, a part at a time, leaves what the executor leaves; the line, too."""
     commands = inhabited(kind)
     do(commands, *MOVE)
-    for _ in range(80):
-        for level in commands.session.levels:
+    for at in range(80):
+        for level in commands.session.levels if at % 4 == 0 else ():
             level.take(commands.session.memory)
             level.values = level.executor.values()
             do(commands, f"level {level.name}", "PREPROCESS", "STATE-TABLE", "POSTPROCESS")
@@ -1027,18 +1039,13 @@ def test_a_part_that_has_no_whole_number_is_refused(walker: Path) -> None:
     assert state(commands) == before
 
 
-USES: dict[str, tuple[str, str]] = {
-    "on its line": ("use words\n", ""),
-    "after a declaration": ("const one = 1 use words\n", ""),
-    "over two lines": ("use\n  words\n", ""),
-    "after a comment": ("use # what is said\n words\n", ""),
-}
+USES = ("use words\n", "const one = 1 use words\n", "use\n  words\n", "use # what is said\n words\n")
 
 
-@pytest.mark.parametrize("case", USES)
-def test_a_used_file_is_kept_however_its_use_is_written(case: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("use", USES)
+def test_a_used_file_is_kept_however_its_use_is_written(use: str, tmp_path: Path) -> None:
     (tmp_path / "words.rcs").write_text("enum word { one, two }\n")
-    (tmp_path / "t.rcs").write_text(f"{USES[case][0]}input w : word\n")
+    (tmp_path / "t.rcs").write_text(f"{use}input w : word\n")
     before = kept(tmp_path / "t.rcs")
     assert before.texts["words.rcs"] == b"enum word { one, two }\n"
     (tmp_path / "words.rcs").write_text("enum word { two, one }\n")
