@@ -113,7 +113,6 @@ def campaign(count: int, seed: str) -> tuple[Counter[Outcome], int]:
 
 
 def main() -> None:
-    """A long run, by command."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--count", type=int, default=1000, help="repairs that are proved")
     arguments.add_argument("--seed", default="1")

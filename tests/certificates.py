@@ -539,7 +539,6 @@ def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def at(node: Any, path: Sequence[Any]) -> Any:
-    """The value at a place."""
     for key in path:
         node = node[key]
     return node
@@ -810,7 +809,6 @@ class Attack:
 
 
 def main() -> int:
-    """A long run."""
     parser = argparse.ArgumentParser(prog="python -m tests.certificates")
     parser.add_argument("--count", type=int, default=1_000)
     parser.add_argument("--seed", type=int, default=1)

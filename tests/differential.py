@@ -107,7 +107,6 @@ class Kind:
         return float(nearest) if self.sort in REALS else int(nearest)
 
     def literal(self, value: Value) -> str:
-        """A value in the language."""
         if self.sort == "bool":
             return "true" if value else "false"
         if self.sort == "enum":
@@ -312,7 +311,6 @@ class Maker:
         self.bodies: dict[str, str] = {}
 
     def name(self, head: str) -> str:
-        """A name of its own."""
         self.number += 1
         return self.words() if self.words else f"{head}{self.number}"
 
@@ -358,15 +356,9 @@ class Maker:
             low, high = rng.choice(ends) if rng.randrange(3) else (rng.randint(-9, 3), rng.randint(3, 99))
             return Kind("int", f"int {low} .. {high}", low, high)
         reals = (
-            (-1.5, 2.5),
-            (0.0, 1.0),
-            (0.0, 1e308),
-            (-1e308, 1e308),
-            (1e-310, 3.0),
-            (-4.0, -0.25),
-            (0.0, 0.0),
+            (-1.5, 2.5), (0.0, 1.0), (0.0, 1e308), (-1e308, 1e308), (1e-310, 3.0), (-4.0, -0.25), (0.0, 0.0),
             (-1e-320, 1e-320),
-        )
+        )  # fmt: skip
         a, b = rng.choice(reals)
         if sort == "single":
             a, b = (
@@ -718,7 +710,6 @@ class Maker:
         return Expr(wanted, f"({a.text} {op} {b.text})", lambda s, v: rounded(work(a.of(s, v), b.of(s, v))))
 
     def truth(self, depth: int) -> Expr:
-        """A condition."""
         rng = self.rng
         way = rng.randrange(8) if depth > 0 else rng.randrange(3)
         if self.back and depth > 0 and rng.randrange(7) == 0:
@@ -771,7 +762,6 @@ class Maker:
     # --- statements ---
 
     def block(self, depth: int, count: int) -> tuple[str, Doing]:
-        """Some statements."""
         inner = len(self.locals)
         pairs = [self.statement(depth) for _ in range(self.rng.randint(1, count))]
         del self.locals[inner:]
@@ -784,7 +774,6 @@ class Maker:
         return " ".join(text for text, _ in pairs), run
 
     def statement(self, depth: int) -> tuple[str, Doing]:
-        """One statement."""
         rng = self.rng
         way = rng.randrange(10) if depth > 0 else rng.randrange(4)
         if way < 3:
@@ -832,7 +821,6 @@ class Maker:
         return text, lambda s, v: s.__setitem__(where, kept(wanted.of(s, v)))
 
     def local(self) -> tuple[str, Doing]:
-        """A local with a value."""
         name, kind = self.local_name("k"), self.kind()
         value = self.of_kind(kind, 2)
         self.locals.append((name, kind, True))
@@ -887,7 +875,6 @@ class Maker:
         return text, lambda s, v: body(s, [kept(arg.of(s, v)) for arg in args])
 
     def procedure(self) -> None:
-        """A procedure with parameters."""
         name, kinds = self.name("p"), tuple(self.kind() for _ in range(self.rng.randrange(3)))
         params: list[str] = []
         for kind in kinds:
@@ -1117,7 +1104,6 @@ class Maker:
     # --- the whole ---
 
     def draw(self) -> Drawn:
-        """A program of one level."""
         rng, made = self.rng, self.made
         sizes = [(self.name("e"), rng.choice(self.members)) for _ in range(2)]
         self.enums = tuple(
@@ -1152,7 +1138,6 @@ class Maker:
         return made
 
     def constant(self) -> None:
-        """A named constant."""
         kind, name = self.kind(), self.name("c")
         if kind.sort == "single":
             return
@@ -1368,7 +1353,6 @@ def between(low: Any, high: Any, value: Any) -> bool:
 
 
 def is_same(one: Any, value: Any) -> bool:
-    """Whether it is this value."""
     return bool(one == value)
 
 
@@ -1388,7 +1372,6 @@ def ends_of(kind: Kind) -> tuple[int, int]:
 
 
 def negated(one: Expr) -> Expr:
-    """The condition turned round."""
     return Expr(BOOL, f"(not {one.text})", lambda s, v: not one.of(s, v))
 
 
@@ -1546,7 +1529,6 @@ def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
 
 
 def interpreted(drawn: Drawn, program: Program, state: State) -> tuple[Seen, State]:
-    """One cycle by the interpreter."""
     did = cycle(program, program.levels[0], state)
     now = dict(did.snapshot)
     shown = {**now, **lines_of(program, now)}
@@ -1559,8 +1541,6 @@ def lines_of(program: Program, state: Mapping[Any, Value]) -> State:
 
 
 class InPython:
-    """The emitted Python."""
-
     def __init__(self, one: Built) -> None:
         self.one = one
         [text] = [text for path, text in one.files.items() if path.endswith(".py")]
@@ -1573,7 +1553,6 @@ class InPython:
         self.names = {leaf["name"]: leaf["attribute"] for leaf in one.symbols["leaves"]}
 
     def run(self, inputs: State) -> Seen:
-        """One cycle."""
         for name, value in inputs.items():
             setattr(self.state, self.names[name], value)
         fault = self.cycle(self.state)
@@ -1632,8 +1611,6 @@ def library(programs: Sequence[Built], folder: Path, *flags: str, cc: str = "cc"
 
 
 class InC:
-    """The emitted C."""
-
     def __init__(self, one: Built, made: ctypes.CDLL) -> None:
         self.one, p = one, one.symbols["program"]
         getattr(made, f"{p}_reset")()
@@ -1641,7 +1618,6 @@ class InC:
         self.inputs = [leaf["name"] for leaf in one.symbols["leaves"] if leaf["kind"] == "input"]
 
     def run(self, inputs: State) -> Seen:
-        """One cycle."""
         given = array("q", [word(inputs[name]) for name in self.inputs] or [0])
         found = array("q", bytes(8 * (4 + len(self.one.symbols["leaves"]))))
         self.go(*(ctypes.c_void_p(one.buffer_info()[0]) for one in (given, found)))

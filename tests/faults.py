@@ -92,7 +92,6 @@ class Judged:
 
     @property
     def catchers(self) -> tuple[str, ...]:
-        """Who caught it."""
         return tuple(name for name, answer in self.answers.items() if answer.caught)
 
 
@@ -320,7 +319,6 @@ def matrix(judged: Iterable[Judged], names: tuple[str, ...]) -> Iterator[str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command."""
     parser = argparse.ArgumentParser(prog="python -m tests.faults", description=__doc__)
     parser.add_argument("--levels", nargs="+", choices=LEVELS, default=list(LEVELS))
     parser.add_argument("--each", type=int, default=50, help="faults of each level")

@@ -146,16 +146,8 @@ def campaign(runs: int, seed: int) -> tuple[Counter[str], float]:
 # --- names, types and docs ---
 
 STRICT = (
-    "-std=c99",
-    "-O1",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wpedantic",
-    "-Wshadow",
-    "-Wtrigraphs",
-    "-Werror",
-)
+    "-std=c99", "-O1", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wshadow", "-Wtrigraphs", "-Werror",
+)  # fmt: skip
 OURS = frozenset(
     """input state output table level procedure module owner extern enum record type unit const use assume invariant property
     was then reads writes python c bool int real true false and or xor not implies in mod abs min max if else case for next
@@ -174,18 +166,9 @@ ODD = """s v_x x X x_ _x __x __slots__ __init__ _value_ _missing_ State IntEnum 
     i0 w0 given subject chosen more_i INT_MAX EOF E2BIG A I B0 None_ mro self m t t0 do run exact bit32 admit settle init class_x_0 K0_0
     G0 O0 l1 Il _Bool _Generic __LINE__ _ __ e1 x1e5 f u8 L R lines step cycle name value""".split()  # fmt: skip
 MADE = (
-    "was_{}",
-    "held_{}",
-    "line_of_{}",
-    "to_{}",
-    "last_{}",
-    "none_{}",
-    "line_{}",
-    "keep_previous",
-    "none",
-    "was_v",
-    "line_of_t",
-)
+    "was_{}", "held_{}", "line_of_{}", "to_{}", "last_{}", "none_{}", "line_{}", "keep_previous", "none",
+    "was_v", "line_of_t",
+)  # fmt: skip
 """What the compiler calls the states, procedures and members that it adds."""
 ENDINGS = "_ _2 _line _lines _step _cycle _next _t _0 _1 _LINES _ACTIONS _out __ _K0_0".split()
 DOCS = (
@@ -260,19 +243,9 @@ OF_LINKS = OURS | frozenset(
 )
 """Words of the language where levels are linked, and what the protocol makes."""
 MADE_BY_LINKS = (
-    "done",
-    "failed",
-    "to_a",
-    "last_a",
-    "a_late",
-    "new_command",
-    "answered",
-    "inc_command",
-    "settle",
-    "value",
-    "order",
-    "x",
-)
+    "done", "failed", "to_a", "last_a", "a_late", "new_command", "answered", "inc_command", "settle", "value",
+    "order", "x",
+)  # fmt: skip
 WORD = re.compile(r"\b[a-z_][a-z_0-9]*\b")
 
 
@@ -367,7 +340,6 @@ def names_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[st
 
 
 def main() -> None:
-    """A long run, by command."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--runs", type=int, default=10_000)
     arguments.add_argument("--seed", type=int, default=1)

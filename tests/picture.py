@@ -113,7 +113,6 @@ def studio(path: Path) -> None:
 
 
 def main() -> None:
-    """Writes the pictures."""
     PICTURES.mkdir(exist_ok=True)
     if sys.argv[1:] == ["studio"]:
         studio(PICTURES / "studio.png")

@@ -109,7 +109,6 @@ class Mutant:
 
     @property
     def module(self) -> str:
-        """The module of the function."""
         return self.function.partition(":")[0]
 
     def put(self) -> None:
@@ -281,7 +280,6 @@ class Campaign:
 
 
 def _test(name: str) -> str:
-    """The test without its parameters."""
     return name.partition("[")[0]
 
 

@@ -124,7 +124,6 @@ def by_function(took_s: Mapping[str, float]) -> dict[str, float]:
 
 
 def main(junit: Path) -> None:
-    """Write the lists anew."""
     of_cases = measured(junit)
     left_out = {name for name in chosen(THOROUGH) if name not in of_cases}
     lists = {THOROUGH: sorted({*choose_thorough(of_cases), *left_out})}

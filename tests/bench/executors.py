@@ -154,7 +154,6 @@ def c_counts(
 
 
 def measured(label: str, program: Program) -> Measured:
-    """Measure one table."""
     if label == "ACQUIRE":
         verdict = prove_program(program, Options())
         assert verdict.proved is not None
@@ -166,7 +165,6 @@ def measured(label: str, program: Program) -> Measured:
 
 
 def main() -> None:
-    """Prints the table."""
     print(f"{'table':12}{'masks':>10}{'scan':>12}{'C KiB':>10}   instructions a match, -O2, by callgrind")
     for label, program in programs():
         print(measured(label, program), flush=True)

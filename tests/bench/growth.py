@@ -143,7 +143,6 @@ def costs(made: Hierarchy, effort: Effort | None = None) -> list[Cost]:
 
 
 def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
-    """A line for each size."""
     yield (
         f"{'levels':>6} {'tables':>6} {'seconds':>8} {'questions':>9} {'s a level':>9} "
         f"{'of the dearest':>14} {'open':>5} {'tables x':>8} {'seconds x':>9} {'questions x':>11}"

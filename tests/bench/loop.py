@@ -37,7 +37,6 @@ class Stopwatch:
     seconds: float = 0.0
 
     def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:
-        """One cycle."""
         begun = time.perf_counter()
         self.inner(system, due)
         self.seconds += time.perf_counter() - begun

@@ -77,7 +77,6 @@ def limited(seconds: float, work: Callable[..., str], *args: object) -> str:
 
 
 def peer_time(number: int, family: str, lines: int, variables: int) -> str:
-    """Seconds that one peer takes."""
     program = compiled(getattr(families, family)(lines, variables, lines + variables))
     peer = PEERS[number]
     begun = time.perf_counter()
@@ -87,7 +86,6 @@ def peer_time(number: int, family: str, lines: int, variables: int) -> str:
 
 
 def main() -> None:
-    """Prints both tables."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--large", action="store_true", help="16,384 lines too")
     arguments.add_argument("--limit", type=float, default=20.0, help="seconds for each peer and table")

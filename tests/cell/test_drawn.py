@@ -38,6 +38,7 @@ from rcsc_cell.pictures.room import ALONE, NAMED, TOP, Block, Mark
 from rcsc_cell.pictures.scene import DrawnCell, cell
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.workstation.prepared import database_of
+from tests.cell.test_pictures import lines
 from tests.compose.test_findings import LAST_ECHO, PUBLISHED, REPO
 from tests.support.browser import Browser
 from tests.support.proved import obligation_of
@@ -81,15 +82,6 @@ class Page:
         """What stands in a frame, without its markup."""
         plain = re.sub(r"<svg.*?</svg>", "", self.frames[at - 1], flags=re.DOTALL)
         return " ".join(re.sub(r"<[^>]*>", " ", plain).split())
-
-
-def lines(svg: str, kind: str) -> list[list[tuple[float, float]]]:
-    """The points of each line of a kind."""
-    found = [element for element in ET.fromstring(svg).iter() if element.get("class") == kind]  # noqa: S314  # our own text
-    return [
-        [(float(x), float(y)) for x, y in (point.split(",") for point in element.attrib["points"].split())]
-        for element in found
-    ]
 
 
 def marked(svg: str) -> list[str]:

@@ -145,17 +145,7 @@ def test_to_look_at_a_cell_changes_nothing_in_it() -> None:
 
 
 def _written(function: ast.FunctionDef) -> set[str]:
-    state = {
-        "qpos",
-        "qvel",
-        "qacc",
-        "xfrc_applied",
-        "qfrc_applied",
-        "mocap_pos",
-        "mocap_quat",
-        "xpos",
-        "eq_active",
-    }
+    state = {*"qpos qvel qacc xfrc_applied qfrc_applied mocap_pos mocap_quat xpos eq_active".split()}
     targets = [
         target
         for node in ast.walk(function)

@@ -72,7 +72,6 @@ def outside(database: Database) -> list[Timed]:
 
 
 def plant_of(made: ScriptDraft) -> Plant:
-    """The plant of a run."""
     [world] = [one for one in made.system.outside if isinstance(one, Timed)]
     return world
 
@@ -193,13 +192,11 @@ class Below:
 
     @staticmethod
     def made(rows: tuple[ScriptRow, ...]) -> Workstation:
-        """A workstation."""
         places = {"BUFFER": 3, "FIX-MAC1": 5, "WS-SAFE": 7}
         safe = {"FIX-MAC1": "WS-SAFE"}
         return workstation(rows, places, signatures(description(SYSTEM))["task"], safe)
 
     def step(self, count: int = 1) -> None:
-        """Ticks."""
         for _ in range(count):
             self.held |= self.station.step(self.tick, self.held.get)
             self.tick += 1

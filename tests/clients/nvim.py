@@ -18,7 +18,6 @@ WAITS_S = 300
 
 
 def main() -> int:
-    """The story of `story.lua`, once."""
     nvim = shutil.which("nvim")
     assert nvim, "Neovim is needed (Debian's package `neovim`)"
     with tempfile.TemporaryDirectory() as name:
@@ -28,18 +27,9 @@ def main() -> int:
         (folder / "door.rcs").write_text(DOOR, encoding="utf-8")
         begin = f"set rtp^={folder} | let g:rcsc = '{Path(sys.executable).with_name('rcsc')}' | let mapleader = ' '"
         command: list[str | Path] = [
-            nvim,
-            "--headless",
-            "-u",
-            "NONE",
-            "-i",
-            "NONE",
-            "--cmd",
-            begin,
-            "-c",
-            f"luafile {STORY}",
+            nvim, "--headless", "-u", "NONE", "-i", "NONE", "--cmd", begin, "-c", f"luafile {STORY}",
             folder / "door.rcs",
-        ]
+        ]  # fmt: skip
         ran = subprocess.run(command, capture_output=True, text=True, timeout=WAITS_S, check=False)
         said = (ran.stdout + ran.stderr).replace("\r", "")
         assert ran.returncode == 0, said

@@ -158,14 +158,7 @@ def test_every_word_of_the_grammar_is_coloured_somewhere() -> None:
     }
     for terminal in LARK.terminals:
         if not isinstance(terminal.pattern, PatternStr) and terminal.name not in {
-            "NAME",
-            "REAL",
-            "INT",
-            "MASK",
-            "GROUPS",
-            "STRING",
-            "COMMENT",
-            "ROW",
+            *"NAME REAL INT MASK GROUPS STRING COMMENT ROW".split()
         }:
             bare = re.sub(r"\(\?[=!].*", "", terminal.pattern.value)
             listed.update(re.findall(r"(?<![\\\[A-Za-z])[a-z]{2,}", bare))
@@ -245,14 +238,9 @@ def test_what_the_extension_says_of_itself_is_there() -> None:
 
 
 LONG = (
-    "|" + "-" * 900 + "x",
-    "0 " * 450 + ".",
-    "| " * 450,
-    '"' * 900,
-    "single " + " " * 900,
-    "a.b" * 300,
+    "|" + "-" * 900 + "x", "0 " * 450 + ".", "| " * 450, '"' * 900, "single " + " " * 900, "a.b" * 300,
     "| a " + "above " * 150,
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("text", LONG, ids=lambda text: text[:8])

@@ -309,7 +309,6 @@ def _await(address: str, server: "subprocess.Popen[bytes]") -> None:
 
 
 def main() -> int:
-    """The story, once."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--code", type=Path, help="a folder with code-server in node_modules")
     parser.add_argument("--rcsc", default=str(Path(sys.executable).with_name("rcsc")))

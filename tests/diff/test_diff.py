@@ -250,19 +250,8 @@ procedure keep { s := s }
 procedure both { if b { s := 2 } else { o := 3 } }
 """
 ACTIONS = (
-    "",
-    "",
-    "o := 0",
-    "o := 1",
-    "o := c",
-    "up",
-    "copy",
-    "keep",
-    "both",
-    "up; o := 2",
-    "o := 2; up",
-    "o := s",
-)
+    "", "", "o := 0", "o := 1", "o := c", "up", "copy", "keep", "both", "up; o := 2", "o := 2; up", "o := s",
+)  # fmt: skip
 CELLS = {
     "a": ("", "", "red", "green", "/= blue", "in {red, blue}"),
     "b": ("", "", "true", "false"),

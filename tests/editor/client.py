@@ -86,7 +86,6 @@ class Client:
         self.process.stdin.flush()
 
     def tell(self, method: str, params: Any) -> None:
-        """Send a notification."""
         self._send({"method": method, "params": params})
 
     def send(self, method: str, params: Any) -> int:
@@ -135,7 +134,6 @@ class Client:
     # --- documents ---
 
     def uri(self, name: str) -> str:
-        """What a file is called."""
         return name if ":" in name else (self.folder / name).as_uri()
 
     def open(self, name: str, text: str) -> dict[str, str]:
@@ -147,7 +145,6 @@ class Client:
         return {"uri": uri}
 
     def change(self, name: str, text: str) -> None:
-        """Type into a document."""
         uri = self.uri(name)
         self._versions[uri] += 1
         document = {"uri": uri, "version": self._versions[uri]}

@@ -361,20 +361,9 @@ def test_columns_count_what_the_client_counts(tables: Path) -> None:
 def test_odd_texts_are_survived(client: Client, end: str) -> None:
     """Whatever a text holds, the next question is answered."""
     odd = [
-        "",
-        "\ufeff",
-        "\x00",
-        "|",
-        "||",
-        "table",
-        "table t {",
-        "table t {|",
-        "|" * 3000,
-        "\u2028\x0b\x0c",
-        "\ud83e",
-        "{" * 500,
-        "use a\nuse a",
-    ]
+        "", "\ufeff", "\x00", "|", "||", "table", "table t {", "table t {|", "|" * 3000, "\u2028\x0b\x0c",
+        "\ud83e", "{" * 500, "use a\nuse a",
+    ]  # fmt: skip
     odd += [
         "table t {\n" + "| a " * 400 + "||\n" + "|--" * 400 + "||\n}",
         "é" * 2000 + " := " + "(" * 200,

@@ -326,14 +326,9 @@ def test_damage_before_the_last_line_is_refused(tmp_path: Path) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     good = json.loads(lines[2])
     odd = [
-        {"index": -1},
-        {"index": "1"},
-        {"ticks": 1.5},
-        {"ticks": -1},
-        {"faults": [1]},
-        {"end": None},
+        {"index": -1}, {"index": "1"}, {"ticks": 1.5}, {"ticks": -1}, {"faults": [1]}, {"end": None},
         {"lines": "zz"},
-    ]
+    ]  # fmt: skip
     odd += [
         {"lines": "f" * 200_000},
         {"findings": [["a", "b", "c"]]},

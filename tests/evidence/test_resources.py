@@ -225,7 +225,6 @@ g:
 
 
 def bound(text: str, loops: Mapping[int, int] | None = None) -> int:
-    """The bound of `f`."""
     return Bounds(of_compiler(text), of_disassembly("", ""), loops or {}).of("f")
 
 

@@ -25,7 +25,6 @@ DOCK, PAPER = REPO / "tests/data/dock/system.toml", REPO / "tables/system.toml"
 
 @cache
 def whole_of(path: Path) -> Whole:
-    """A system, proved and compiled."""
     project = proved(Settings(tables_in((), (path,)), Options()))
     generated = Generated(("c",), defensive=False)
     for root, program in project.executable:

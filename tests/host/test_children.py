@@ -248,7 +248,6 @@ def test_a_lock_on_what_is_gone_is_none(tmp_path: Path, monkeypatch: pytest.Monk
     opened, real = threading.Event(), os.open
 
     def told(*given: Any) -> int:
-        """Opens, and says so."""
         made = real(*given)
         opened.set()
         return made

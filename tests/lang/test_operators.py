@@ -156,16 +156,8 @@ EDGES: dict[Scalar, tuple[Value, ...]] = {
     UNSIGNED_ROUNDED: (0, 2**24 + 1, 2**63 + 2**39, 2**63 + 2**39 + 1, 2**63 + 3 * 2**39 - 1, U64_MAX),
 }
 ON_REALS: tuple[Comparison | Arithmetic, ...] = (
-    *sorted(COMPARISONS),
-    Op.ADD,
-    Op.SUB,
-    Op.MUL,
-    Op.DIV,
-    Op.MIN,
-    Op.MAX,
-    Op.NEG,
-    Op.ABS,
-)
+    *sorted(COMPARISONS), Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MIN, Op.MAX, Op.NEG, Op.ABS,
+)  # fmt: skip
 UNARY = {Op.NEG, Op.ABS, Op.TO_INT, Op.TO_REAL, Op.TO_SINGLE, Op.NOT}
 
 
@@ -183,7 +175,6 @@ class Case:
     made: Scalar
 
     def of(self, *args: Expr) -> Expr:
-        """The operator applied."""
         if self.op is None:
             return Among(args[0], MEMBERS[self.kind])
         return Apply(self.op, args, self.made)
@@ -685,14 +676,12 @@ def c_word(kind: Scalar) -> str:
 
 
 def c_bits(kind: Scalar, value: Value) -> str:
-    """The value as 64 bits."""
     if isinstance(kind, Real):
         return f"{struct.unpack('<Q', struct.pack('<d', value))[0]}u"
     return f"{int(value) % 2**64}u"
 
 
 def c_value(kind: Scalar, bits: str) -> str:
-    """The value of 64 bits."""
     return f"({wide_type(kind)})of_bits({bits})" if isinstance(kind, Real) else f"({wide_type(kind)}){bits}"
 
 

@@ -64,7 +64,6 @@ def program(text: str) -> Program:
 
 
 def member(kind: Scalar, word: str) -> Value:
-    """The member of that name."""
     value = value_of_text(kind, word)
     assert value is not None
     return value
@@ -142,7 +141,6 @@ class Level:
     def cycle(
         self, order: tuple[int, str], reports: dict[str, tuple[int, str, str, str]], choice: str
     ) -> None:
-        """One cycle."""
         heard = [said.look(reports[name][0], reports[name][2]) for name, said in self.below.items()]
         echoed = all(heard)
         if echoed:
@@ -400,7 +398,6 @@ class Ordering:
         return self
 
     def order(self, name: str) -> tuple[int, str, int]:
-        """Its number, command and width."""
         number, command, width = (
             self.now[f"to_{name}.{part}"] for part in ("inc_command", "input_command", "width_mm")
         )

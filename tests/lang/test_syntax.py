@@ -572,18 +572,9 @@ def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.
 
 
 PARTS = [
-    "a",
-    "(a or b)",
-    "x = 1",
-    "y = 1.5",
-    "w = 0bx1",
-    "0x1F = w",
-    "x in {1, 2}",
-    "f[1]",
-    "a for 2 [s]",
-    "a.and_",
-    "or_1 = 1",
-]
+    "a", "(a or b)", "x = 1", "y = 1.5", "w = 0bx1", "0x1F = w", "x in {1, 2}", "f[1]", "a for 2 [s]",
+    "a.and_", "or_1 = 1",
+]  # fmt: skip
 JOINTS = [
     f"{before}{word}{after}"
     for word in ("and", "and", "or", "xor", "implies")
@@ -643,22 +634,9 @@ def test_each_condition_is_parsed_once_though_many_lines_join_it(monkeypatch: py
 
 
 EDGES = [
-    "",
-    " ",
-    "-",
-    " - ",
-    "\u00a0",
-    "1",
-    " 1 ",
-    "> 1",
-    "in {1, 2}",
-    "DEFAULT",
-    "DEFAULT unreachable",
-    "= DEFAULT",
-    "0x",
-    ">",
-    "a)",
-]
+    "", " ", "-", " - ", "\u00a0", "1", " 1 ", "> 1", "in {1, 2}", "DEFAULT", "DEFAULT unreachable",
+    "= DEFAULT", "0x", ">", "a)",
+]  # fmt: skip
 
 
 @settings(max_examples=300)

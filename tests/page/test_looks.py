@@ -155,21 +155,9 @@ KEYS = (
     "shift+tab", "f2", "delete", "space", "ctrl+z", "ctrl+y", "ctrl+s", "ctrl+enter", "shift+up", "shift+down",
 )  # fmt: skip
 WRITTEN = (
-    "0",
-    "-",
-    "true",
-    "idle | 1",
-    "'",
-    "\u202e",
-    "x" * 300,
-    "999999999999999999999",
-    "task",
-    "set",
-    "halt",
-    "\t\t",
-    "é",
-    "5 mm",
-)
+    "0", "-", "true", "idle | 1", "'", "\u202e", "x" * 300, "999999999999999999999", "task", "set", "halt",
+    "\t\t", "é", "5 mm",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -33,7 +33,6 @@ def dock(tmp_path: Path) -> Path:
 
 
 def rows(path: Path) -> list[tuple[str, str]]:
-    """The buffers of a description."""
     return [(wire.source, wire.target) for wire in description(path).wires]
 
 

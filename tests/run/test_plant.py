@@ -51,7 +51,6 @@ def nothing(_: str) -> Values | None:
 
 
 def holding(held: Mapping[str, Values]) -> Callable[[str], Values | None]:
-    """Buffers that hold these values."""
     return held.get
 
 

@@ -339,14 +339,9 @@ def answered_once(path: Path, count: int, first: int) -> None:
 
 
 COMPILER = {
-    "rcsc.lang.model",
-    "rcsc.code.emit.plan",
-    "rcsc.proof.solvers",
-    "rcsc.proof.symbolic",
-    "rcsc.proof.table",
-    "rcsc.lang.resolve",
-    "rcsc.lang.syntax.tree",
-}
+    "rcsc.lang.model", "rcsc.code.emit.plan", "rcsc.proof.solvers", "rcsc.proof.symbolic", "rcsc.proof.table",
+    "rcsc.lang.resolve", "rcsc.lang.syntax.tree",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -318,7 +318,6 @@ def test_a_fault_is_on_for_a_row_or_for_a_run(
 
 
 def _ticks(log: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, dict[str, int]]]:
-    """Each tick's values, by level."""
     assert run(["log", str(log), "--csv", "out.csv"]) == 0
     capsys.readouterr()
     rows = list(csv.DictReader(Path("out.csv").read_text(encoding="utf-8").splitlines()))
@@ -572,18 +571,9 @@ def test_what_a_program_declares_of_its_roles_is_what_a_script_goes_by(
     script.write_text("command,base.beacon,expect\ndock,,\nstop,,\ndock,false,broken\n", encoding="utf-8")
     log = tmp_path / "day.mcap"
     asked = [
-        "run",
-        str(declared),
-        "--plant",
-        "base.py",
-        "--script",
-        str(script),
-        "--no-compile",
-        "--executor",
-        "python",
-        "--log",
-        str(log),
-    ]
+        "run", str(declared), "--plant", "base.py", "--script", str(script), "--no-compile", "--executor",
+        "python", "--log", str(log),
+    ]  # fmt: skip
     assert run(asked) == 0, capsys.readouterr()
     assert run(["replay", str(log), "--system", str(declared), "--executor", "python"]) == 0
     script.write_text("command,base.beacon\ndock,false\n", encoding="utf-8")

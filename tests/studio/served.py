@@ -61,7 +61,6 @@ def _agreed(opening: Opening) -> Agreement:
 
 
 async def until(holds: Callable[[], object]) -> None:
-    """Wait until something holds."""
     async with asyncio.timeout(PATIENCE_S):
         while not holds():  # noqa: ASYNC110  # what it looks at is another thread's
             await asyncio.sleep(0.01)
@@ -129,7 +128,6 @@ class Page:
 
 
 def page(server: Server) -> contextlib.AbstractAsyncContextManager[Page]:
-    """One page of a server."""
     return page_at(server.address)
 
 

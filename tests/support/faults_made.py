@@ -65,7 +65,6 @@ class Row:
         return any(cell.strip().startswith("DEFAULT") for cell in self.cells)
 
     def text(self, cells: Sequence[str] | None = None, actions: Sequence[str] | None = None) -> str:
-        """The line again."""
         left, right = cells or self.cells, actions or self.actions
         return f"  |{'|'.join(left)}||{'|'.join(right)}|"
 

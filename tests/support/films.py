@@ -8,7 +8,6 @@ from typing import Any
 
 
 def film_of(text: str) -> dict[str, Any]:
-    """The film of a page."""
     [data] = re.findall(r'<script type="application/gzip" id="film">(.*?)</script>', text, re.DOTALL)
     film: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(data)))
     return film

@@ -50,13 +50,11 @@ def _over(names: Names, operators: tuple[str, ...]) -> SearchStrategy[str]:
 
 @cache  # Hypothesis examines a recursive strategy at its first draw: one that is built again costs more than its draws
 def integers_over(names: Names = INTS) -> SearchStrategy[str]:
-    """An integer expression."""
     return _over(names, ("+", "-", "*", "/", "mod"))
 
 
 @cache
 def reals_over(names: Names = REALS) -> SearchStrategy[str]:
-    """A real expression."""
     return _over(names, ("+", "-", "*", "/"))
 
 

@@ -55,7 +55,6 @@ def texts(draw: st.DrawFn, columns: str = "acn") -> str:
 
 
 def written(rows: list[list[str]], columns: str = "acn") -> str:
-    """The text of the table."""
     lines = "\n".join("| " + " | ".join(row) + " ||" for row in rows)
     return f"{HEAD}table t {{\n| line | {' | '.join(columns)} ||\n{lines}\n}}\n"
 
@@ -80,7 +79,6 @@ def point_of(program: Program, witness: Any) -> Point:
 
 
 def inside(program: Program, region: Region) -> set[Point]:
-    """The points of a region."""
     axes = [
         [key for low, high in region.get(str(v.name), (key_bounds(v.type),)) for key in range(low, high + 1)]
         for v in program.variables

@@ -38,7 +38,6 @@ from tests.support.programs.texts import edited
 
 
 def by_cvc5(question: str) -> CaseAnswer:
-    """cvc5's answer."""
     return {"unsat": CaseAnswer.NONE, "sat": CaseAnswer.SOME}.get(cvc5_says(question), CaseAnswer.UNKNOWN)
 
 
@@ -773,17 +772,9 @@ def test_assumptions_are_shown_to_hold_together_at_values_of_the_types() -> None
         program, signed(program, {**certificate, "tables": [{**entry, "witness": {"a": 8, "b": 1}}]})
     ).whole
     wrong: list[Any] = [
-        {"a": 9, "b": 1},
-        {"a": 8, "b": 0},
-        {},
-        {"b": 10},
-        {"b": -1},
-        {"b": True},
-        {"b": 1.5},
-        {"b": "1"},
-        None,
-        [1],
-    ]
+        {"a": 9, "b": 1}, {"a": 8, "b": 0}, {}, {"b": 10}, {"b": -1}, {"b": True}, {"b": 1.5}, {"b": "1"},
+        None, [1],
+    ]  # fmt: skip
     for witness in wrong:
         made = signed(program, {**certificate, "tables": [{**entry, "witness": witness}]})
         assert certify(program, made).problems, witness

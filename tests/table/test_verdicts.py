@@ -154,17 +154,9 @@ CELLS = {
     "when": ("", "", "", "x * y > 1", "not (x * y > 1)", "(x + y) mod 2 = 0", "x * x < y"),
 }
 ASSUMED = (
-    "p",
-    "not p",
-    "x < 2",
-    "y /= 0",
-    "x = y",
-    "x < y",
-    "p implies x = 0",
-    "x + y <= 3",
-    "y > 3 - x",
+    "p", "not p", "x < 2", "y /= 0", "x = y", "x < y", "p implies x = 0", "x + y <= 3", "y > 3 - x",
     "p or y > 1",
-)
+)  # fmt: skip
 
 
 @st.composite

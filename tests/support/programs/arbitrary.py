@@ -10,20 +10,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.tree import Name
 
 NAMES = st.sampled_from(
-    [
-        "a",
-        "b",
-        "long_name",
-        "x1",
-        "status",
-        "Z",
-        "DEFAULT",
-        "unreachable",
-        "when",
-        "line",
-        "procedures",
-        "status_out",
-    ]
+    "a b long_name x1 status Z DEFAULT unreachable when line procedures status_out".split()
 ).map(Name)
 WORDS = st.lists(st.sampled_from(["why", "a note", "  indented", "x := 3", "|"]), max_size=2).map(tuple)
 DOCS = st.lists(st.sampled_from(["what it is", "in mm"]), max_size=2).map(tuple)
@@ -50,28 +37,7 @@ LITERALS: SearchStrategy[tree.Expr] = st.one_of(
 )
 REFERENCES: SearchStrategy[tree.Expr] = NAMES.map(tree.Reference)
 # Without `|`, which ends a cell of a table.
-BINARY = st.sampled_from(
-    [
-        "implies",
-        "and",
-        "or",
-        "xor",
-        "=",
-        "/=",
-        "<",
-        "<=",
-        ">",
-        ">=",
-        "+",
-        "-",
-        "*",
-        "/",
-        "mod",
-        "&",
-        "<<",
-        ">>",
-    ]
-)
+BINARY = st.sampled_from("implies and or xor = /= < <= > >= + - * / mod & << >>".split())
 
 
 def _members(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tuple[tree.Member, ...]]:
@@ -110,13 +76,11 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
 
 @cache  # Hypothesis examines a strategy at its first draw: one that is built again costs more than its draws
 def expressions() -> SearchStrategy[tree.Expr]:
-    """Any expression."""
     return st.recursive(st.one_of(LITERALS, REFERENCES), _deeper, max_leaves=8)
 
 
 @cache
 def places() -> SearchStrategy[tree.Expr]:
-    """Anything that can be assigned."""
     fields = st.builds(tree.FieldOf, REFERENCES, NAMES)
     return st.one_of(REFERENCES, fields, st.builds(tree.IndexOf, fields, expressions()))
 
@@ -142,13 +106,11 @@ def types() -> SearchStrategy[tree.TypeExpr]:
 
 @cache
 def calls() -> SearchStrategy[tree.Statement]:
-    """A call."""
     return st.builds(tree.Call, NAMES, st.lists(expressions(), max_size=2).map(tuple), comments=WORDS)
 
 
 @cache
 def assignments() -> SearchStrategy[tree.Statement]:
-    """An assignment, deferred or not."""
     return st.builds(tree.Assign, places(), expressions(), st.booleans(), comments=WORDS)
 
 
@@ -166,7 +128,6 @@ def _blocks(inner: SearchStrategy[tree.Statement]) -> SearchStrategy[tree.Statem
 
 @cache
 def statements() -> SearchStrategy[tree.Statement]:
-    """Any statement."""
     local = st.builds(tree.Local, NAMES, types(), st.none() | expressions(), comments=WORDS)
     return st.recursive(st.one_of(calls(), assignments(), local), _blocks, max_leaves=4)
 
@@ -176,7 +137,6 @@ COMPARISONS = st.sampled_from(["=", "/=", "<", "<=", ">", ">="])
 
 @cache
 def conditions() -> SearchStrategy[tree.Condition]:
-    """A condition cell."""
     return st.one_of(
         st.builds(tree.Comparison, COMPARISONS, expressions()),
         st.builds(tree.OneOf, _members(expressions()), negated=st.booleans()),
@@ -205,7 +165,6 @@ REQUIREMENTS = st.lists(
 
 @st.composite
 def tables(draw: st.DrawFn) -> tree.TableDecl:
-    """A table with even rows."""
     columns = draw(_columns())
     words = draw(ACTIONS)
     headings = tuple(tree.Heading(column, "when" if column is None else "") for column in columns)
@@ -351,7 +310,6 @@ def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
 
 
 def _procedures() -> SearchStrategy[tree.Declaration]:
-    """Procedures, modules, and extern procedures."""
     params = st.lists(st.builds(tree.Parameter, NAMES, types()), max_size=2).map(tuple)
     body = st.lists(statements(), max_size=3).map(tuple)
     touched = st.lists(places(), max_size=2).map(tuple)
@@ -396,7 +354,6 @@ def _roles() -> SearchStrategy[tree.Declaration]:
 
 @cache
 def declarations() -> SearchStrategy[tree.Declaration]:
-    """Any declaration."""
     return st.one_of(_names_of_things(), _variables_and_claims(), _procedures(), tables(), _roles(), levels())
 
 
