@@ -6,8 +6,9 @@ reported on the way (of PAUSE another than *done*), and either an order is given
 answered, or every cycle is quiet: all orders are answered, and none is given. Cycles that end early come finitely often.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 from rcsc.compose.contract.environment import Below
 from rcsc.lang.interpret import Fault
@@ -16,6 +17,7 @@ from tests.small_hierarchies.explored import successors
 from tests.small_hierarchies.level import Ran, Role, State
 from tests.small_hierarchies.world import canonical
 
+Place = TypeVar("Place", bound=Hashable)
 ECHOED = ("inc_command", "inc_command_echo", "ref_command_echo", "status_report")
 
 
@@ -114,36 +116,42 @@ def _apart(every: list[Edge], still: tuple[str, ...]) -> Iterator[list[Edge]]:
 
 
 def _round(some: list[Edge]) -> list[tuple[Edge, int]]:
-    """The edges that lead round, each with a number for the states that lead to one another (Kosaraju)."""
-    onward: dict[State, list[State]] = {}
-    back: dict[State, list[State]] = {}
-    for edge in some:
-        onward.setdefault(edge.start, []).append(edge.end)
-        back.setdefault(edge.end, []).append(edge.start)
-    part: dict[State, int] = {}
-    for state in reversed(_left(onward)):
-        waiting = [] if state in part else [state]
+    """The edges that lead round, each with a number for the states that lead to one another."""
+    part = parts((edge.start, edge.end) for edge in some)
+    return [(edge, part[edge.start]) for edge in some if part[edge.start] == part[edge.end]]
+
+
+def parts(pairs: Iterable[tuple[Place, Place]]) -> dict[Place, int]:
+    """A number for each place from or to which a step leads; the same where two lead to one another (Kosaraju)."""
+    onward: dict[Place, list[Place]] = {}
+    back: dict[Place, list[Place]] = {}
+    for start, end in pairs:
+        onward.setdefault(start, []).append(end)
+        back.setdefault(end, []).append(start)
+    part: dict[Place, int] = {}
+    for place in reversed(_left(onward)):
+        waiting = [] if place in part else [place]
         number = len(part)
         while waiting:
             here = waiting.pop()
             if here not in part:
                 part[here] = number
                 waiting += back.get(here, [])
-    return [(edge, part[edge.start]) for edge in some if part[edge.start] == part[edge.end]]
+    return part
 
 
-def _left(onward: Mapping[State, list[State]]) -> list[State]:
-    """Every state, in the order in which a search that goes deep first leaves them."""
-    seen: set[State] = set()
-    order: list[State] = []
+def _left(onward: Mapping[Place, list[Place]]) -> list[Place]:
+    """Every place, in the order in which a search that goes deep first leaves them."""
+    seen: set[Place] = set()
+    order: list[Place] = []
     for start in onward:
         waiting = [(start, False)]
         while waiting:
-            state, done = waiting.pop()
+            place, done = waiting.pop()
             if done:
-                order.append(state)
-            elif state not in seen:
-                seen.add(state)
-                waiting.append((state, True))
-                waiting += [(one, False) for one in onward.get(state, ()) if one not in seen]
+                order.append(place)
+            elif place not in seen:
+                seen.add(place)
+                waiting.append((place, True))
+                waiting += [(one, False) for one in onward.get(place, ()) if one not in seen]
     return order

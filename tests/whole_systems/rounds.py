@@ -5,6 +5,7 @@ In: a system, some of its states. Out: whether a command that a table runs need 
 
 from collections.abc import Iterator
 
+from tests.small_hierarchies.endless import parts
 from tests.whole_systems.part import Event
 from tests.whole_systems.whole import Now, Searched, Step, Whole, steps
 
@@ -93,43 +94,11 @@ def _fair(whole: Whole, found: Searched, some: list[Step], level: int, table: st
     )
 
 
-def _rounds(steps: list[Step]) -> Iterator[list[Step]]:
-    """The steps within each set of states that lead to one another (Tarjan)."""
-    onward: dict[int, list[int]] = {}
-    for step in steps:
-        onward.setdefault(step.start, []).append(step.end)
-    index: dict[int, int] = {}
-    low: dict[int, int] = {}
-    part: dict[int, int] = {}
-    stack: list[int] = []
-    for root in onward:
-        if root in index:
-            continue
-        work = [(root, iter(onward.get(root, ())))]
-        index[root] = low[root] = len(index)
-        stack.append(root)
-        while work:
-            here, rest = work[-1]
-            for other in rest:
-                if other not in index:
-                    index[other] = low[other] = len(index)
-                    stack.append(other)
-                    work.append((other, iter(onward.get(other, ()))))
-                    break
-                if other not in part:
-                    low[here] = min(low[here], index[other])
-            else:
-                work.pop()
-                if work:
-                    low[work[-1][0]] = min(low[work[-1][0]], low[here])
-                if low[here] == index[here]:
-                    while True:
-                        one = stack.pop()
-                        part[one] = here
-                        if one == here:
-                            break
+def _rounds(every: list[Step]) -> Iterator[list[Step]]:
+    """The steps within each set of states that lead to one another."""
+    part = parts((step.start, step.end) for step in every)
     within: dict[int, list[Step]] = {}
-    for step in steps:
-        if part.get(step.start) == part.get(step.end, -1):
+    for step in every:
+        if part[step.start] == part[step.end]:
             within.setdefault(part[step.start], []).append(step)
     yield from within.values()
