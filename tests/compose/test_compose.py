@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -152,31 +153,27 @@ def test_a_fault_of_a_level_is_found_with_the_shortest_run_that_shows_it(fault: 
     assert shortest(ts, obligation, most=len(trace.steps) - 1) is None
 
 
-def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assumes(tmp_path: Path) -> None:
-    other = small_text("lower", ("ref_command_echo := command.input_command", "ref_command_echo := go"))
-    found = prove_system(small_system(tmp_path, lower=other), LITTLE)
+UNNUMBERED = (
+    ("to_lower.input_command /= old_command", "to_lower.input_command /= old_command and begun"),
+    ("module send reads ", "module send reads begun, "),
+)
+
+
+@pytest.mark.parametrize(
+    ("level", "changes", "harmed"),
+    [
+        ("lower", [("ref_command_echo := command.input_command", "ref_command_echo := go")], "upper"),
+        ("upper", UNNUMBERED, "lower"),
+    ],
+    ids=["a subordinate that echoes another command", "a superior that does not number"],
+)
+def test_who_breaks_what_a_neighbour_assumes_is_found(
+    level: str, changes: Sequence[tuple[str, str]], harmed: str, tmp_path: Path
+) -> None:
+    found = prove_system(small_system(tmp_path, **{level: small_text(level, *changes)}), LITTLE)
     assert not found.proved
-    assert [
-        (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
-    ] == [
-        ("upper", False),
-        ("lower", True),
-    ]
-
-
-def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp_path: Path) -> None:
-    twice = small_text(
-        "upper",
-        ("to_lower.input_command /= old_command", "to_lower.input_command /= old_command and begun"),
-        ("module send reads ", "module send reads begun, "),
-    )
-    found = prove_system(small_system(tmp_path, upper=twice), LITTLE)
-    assert [
-        (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
-    ] == [
-        ("upper", True),
-        ("lower", False),
-    ]
+    agreed = [(one.level, one.holds) for one in found.agreements if not one.outside]
+    assert agreed == [("upper", harmed != "upper"), ("lower", harmed != "lower")]
 
 
 @pytest.mark.parametrize(

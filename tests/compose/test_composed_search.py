@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
+from functools import partial
 from itertools import islice, product
 from pathlib import Path
 from random import Random
@@ -692,22 +693,13 @@ ATOMS = (
 )  # fmt: skip
 
 
-def with_another_invariant(random: Random, folder: Path) -> Iterator[TransitionSystem]:
-    """Yield the upper level with a drawn invariant more."""
+def with_more(old: str, new: str, random: Random, folder: Path) -> Iterator[TransitionSystem]:
+    """Yield the upper level with a text that says two drawn conditions instead of another."""
     for at in range(100):
         first, second = random.sample(ATOMS, 2)
-        stated = ("assume in_step", f"invariant drawn : {first} implies {second}\n\nassume in_step")
         with suppress(NoProgramError):
-            yield small_level(folder / str(at), "upper", upper=small_text("upper", stated))
-
-
-def with_another_assumption(random: Random, folder: Path) -> Iterator[TransitionSystem]:
-    """Yield the upper level with another condition assumed of its table."""
-    for at in range(100):
-        first, second = random.sample(ATOMS, 2)
-        assumed = ("monitored : not new_command implies", f"monitored : {first} implies {second} or")
-        with suppress(NoProgramError):
-            yield small_level(folder / str(at), "upper", upper=small_text("upper", assumed))
+            drawn = old, new.format(first, second)
+            yield small_level(folder / str(at), "upper", upper=small_text("upper", drawn))
 
 
 def with_another_buffer(random: Random, folder: Path) -> Iterator[TransitionSystem]:
@@ -724,7 +716,20 @@ def with_another_buffer(random: Random, folder: Path) -> Iterator[TransitionSyst
         yield TransitionSystem(ts.program, ts.level, links, ts.safety)
 
 
-@pytest.mark.parametrize("edits", [with_another_invariant, with_another_assumption, with_another_buffer])
+@pytest.mark.parametrize(
+    "edits",
+    [
+        pytest.param(
+            partial(with_more, "assume in_step", "invariant drawn : {} implies {}\n\nassume in_step"),
+            id="with_another_invariant",
+        ),
+        pytest.param(
+            partial(with_more, "monitored : not new_command implies", "monitored : {} implies {} or"),
+            id="with_another_assumption",
+        ),
+        with_another_buffer,
+    ],
+)
 def test_after_something_else_has_changed_the_same_is_concluded_as_from_nothing(
     edits: Callable[[Random, Path], Iterator[TransitionSystem]], tmp_path: Path, cache: Cache
 ) -> None:

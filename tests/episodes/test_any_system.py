@@ -22,7 +22,7 @@ from rcsc.run.episodes.episode import (
 )
 from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.loop import Loop, check, run
-from rcsc.run.episodes.outcome import EpisodeOutcome
+from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.run.episodes.sampling import draw, fault_classes, fault_names
 from rcsc.run.episodes.search import episodes, found_again, search
 from rcsc.run.episodes.stand import stand
@@ -465,28 +465,22 @@ class TestExecutorsThatAreSpoilt:
         assert finding.message == "level `drive`, table `goto`: no line matches"
         assert outcome.ticks == finding.tick == 13
 
-    def test_a_value_out_of_range_that_is_taken(self, dock: Path) -> None:
-        changed(
-            dock,
-            "drive.rcs",
-            ("travelled_mm : int 0 .. 20000 [mm] clamp", "travelled_mm : int 0 .. 20000 [mm]"),
-        )
-        path = self.spoilt(dock, "drive", ("if not 0 <= i3 <= 20000:", "if not 0 <= i3 <= 20001:"))
+    def refusing(self, dock: Path, change: str) -> EpisodeFinding:
+        """What is found where the module that refuses a reading is spoilt, and one out of range comes."""
+        taken = "travelled_mm : int 0 .. 20000 [mm]"
+        changed(dock, "drive.rcs", (f"{taken} clamp", taken))
+        path = self.spoilt(dock, "drive", ("    if not 0 <= i3 <= 20000:\n", change))
         beyond = Reading("base.travelled", 20_001, 10, 14, refused=True)
         [finding] = run(Episode(executor="python", orders=(UNDOCK,), readings=(beyond,)), path).findings
+        return finding
+
+    def test_a_value_out_of_range_that_is_taken(self, dock: Path) -> None:
+        finding = self.refusing(dock, "    if not 0 <= i3 <= 20001:\n")
         assert finding.property == "refuses what lies out of range"
         assert finding.message == "level `drive` took `travelled_mm` = 20001"
 
     def test_a_refusal_that_leaves_something_behind(self, dock: Path) -> None:
-        changed(
-            dock,
-            "drive.rcs",
-            ("travelled_mm : int 0 .. 20000 [mm] clamp", "travelled_mm : int 0 .. 20000 [mm]"),
-        )
-        refusal = "    if not 0 <= i3 <= 20000:\n"
-        path = self.spoilt(dock, "drive", (refusal, f"{refusal}        s.waited = 77\n"))
-        beyond = Reading("base.travelled", 20_001, 10, 14, refused=True)
-        [finding] = run(Episode(executor="python", orders=(UNDOCK,), readings=(beyond,)), path).findings
+        finding = self.refusing(dock, "    if not 0 <= i3 <= 20000:\n        s.waited = 77\n")
         assert finding.message == "level `drive` changed `waited` in that cycle"
 
     def test_an_answer_to_what_was_never_ordered(self, dock: Path) -> None:

@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, product
 from math import inf, nan
 from pathlib import Path
@@ -99,37 +99,21 @@ table t assuming some, few, fewer, odd {{
     assert stops_of(text) == expected
 
 
-def test_a_condition_that_an_assumption_defines_stops() -> None:
-    text = f"""{declared()}
-table t assuming some, few {{
-  | line | 9 / b || o |
-  | lo   | <= 2  || 1 |
-  | hi   | > 2   || 2 |
-}}
-"""
-    assert stops_of(text) == ("some",)
-
-
-def test_exactly_one_alone_stops_nothing() -> None:
-    text = f"""{declared()}
-table t assuming few {{
-  | line | a      || o |
-  | lo   | < 2    || 1 |
-  | hi   | 2 .. 3 || 2 |
-}}
-"""
-    assert stops_of(text) == ()
-
-
-def test_an_invariant_that_only_an_assumption_keeps_stops() -> None:
-    text = f"""{declared("take")}
-invariant small : n <= 3
-table t assuming few {{
-  | line | a || procedures |
-  | all  |   || take |
-}}
-"""
-    assert stops_of(text) == ("few",)
+@pytest.mark.parametrize(
+    ("named", "declared_too", "heading", "rows", "expected"),
+    [
+        ("some, few", "", "9 / b || o", ("<= 2 || 1", "> 2 || 2"), ("some",)),
+        ("few", "", "a || o", ("< 2 || 1", "2 .. 3 || 2"), ()),
+        ("few", "invariant small : n <= 3", "a || procedures", ("|| take",), ("few",)),
+    ],
+    ids=["a condition that one defines", "exactly one line alone", "an invariant that only one keeps"],
+)
+def test_of_a_table_only_what_safety_needs_stops(
+    named: str, declared_too: str, heading: str, rows: Sequence[str], expected: tuple[str, ...]
+) -> None:
+    lines = "".join(f"| l{at} | {row} |\n" for at, row in enumerate(rows))
+    table = f"table t assuming {named} {{\n| line | {heading} |\n{lines}}}\n"
+    assert stops_of(f"{declared('take')}\n{declared_too}\n{table}") == expected
 
 
 def test_an_assumption_must_be_defined_by_itself() -> None:

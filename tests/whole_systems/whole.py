@@ -74,18 +74,12 @@ class Whole:
     @cached_property
     def into(self) -> list[list[int]]:
         """The wires that lead to each level."""
-        return [
-            [at for at, wire in enumerate(self.wires) if wire.target == level]
-            for level in range(len(self.parts))
-        ]
+        return [[at for at, w in enumerate(self.wires) if w.target == to] for to in range(len(self.parts))]
 
     @cached_property
     def out(self) -> list[list[int]]:
         """The wires that lead from it."""
-        return [
-            [at for at, wire in enumerate(self.wires) if wire.source == level]
-            for level in range(len(self.parts))
-        ]
+        return [[at for at, w in enumerate(self.wires) if w.source == of] for of in range(len(self.parts))]
 
     @cached_property
     def given(self) -> list[tuple[str, ...]]:
