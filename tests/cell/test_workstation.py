@@ -367,6 +367,24 @@ def test_scripts_that_cannot_be_run_are_coded_errors(
     assert "there is no script `make_box`; did you mean `make_boxt`?" in capfd.readouterr().err
 
 
+def test_a_row_meets_the_faults_that_its_script_names(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """They are on while it is under way: the first row, and the last, have none."""
+    script = project / "mute.csv"
+    rows = "VISE-OPEN RIGHT,,,,,\nVISE-CLOSE RIGHT,,,,,FAULT\n"
+    for faults, ended, said in (
+        ("", 0, "VISE-CLOSE RIGHT                           done"),
+        ("vise_stuck blind", 1, "row 2, VISE-CLOSE RIGHT: failed"),
+        ("vise_stick", 1, "row 2: no plant has a fault `vise_stick`; did you mean `vise_stuck`?"),
+    ):
+        script.write_text(HEAD.replace("\n", ",fault\n") + rows.replace("FAULT", faults), encoding="utf-8")
+        assert run(["run", "mute.csv", *QUICK]) == ended, faults
+        told = capfd.readouterr()
+        assert said in told.out + told.err
+        assert ("VISE-OPEN RIGHT                            done" in told.out) == (faults != "vise_stick")
+
+
 FIG_7 = """
 VISE-OPEN RIGHT, CLOSE LEFT | | | |
 MOVE | BOXT (2) | BUFFER | FIX-MAC1 |

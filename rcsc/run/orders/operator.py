@@ -88,6 +88,11 @@ class Operator(Protocol):
         """The result that stopped the script."""
         ...
 
+    @property
+    def faults(self) -> frozenset[str]:
+        """The plant's faults that the row under way switches on."""
+        ...
+
     def begin_at(self, row: int) -> None:
         """Continue at another row, from 0, as if those between were done."""
         ...

@@ -173,6 +173,20 @@ def _cell(name: str, value: object) -> str:
     )
 
 
+def faults_in(cell: str, known: Sequence[str]) -> tuple[str, ...]:
+    """Return the faults that a cell under `fault` names.
+
+    Raises:
+        ValueError: One is none of these.
+    """
+    names = tuple(cell.split())
+    for name in names:
+        if name not in known:
+            error = UnknownFault(name, known)
+            raise ValueError("; ".join((str(error), *error.helps)))
+    return names
+
+
 @dataclass(frozen=True, slots=True)
 class _Reader:
     """Reads rows for the levels that can be ordered, and the buffers that can be set."""
@@ -217,16 +231,8 @@ class _Reader:
             1 if level is None and cycles is None else cycles,
             within,
             expect,
-            self._faults(line),
+            faults_in(line.get(FAULT, ""), self.faults),
         )
-
-    def _faults(self, line: Mapping[str, str]) -> tuple[str, ...]:
-        names = tuple(line.get(FAULT, "").split())
-        for name in names:
-            if name not in self.faults:
-                error = UnknownFault(name, self.faults)
-                raise ValueError("; ".join((str(error), *error.helps)))
-        return names
 
     def _level(self, line: Mapping[str, str]) -> Served:
         if not self.levels:

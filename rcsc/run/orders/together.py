@@ -29,6 +29,23 @@ class _State:
 
 
 @dataclass(slots=True)
+class RowFaults:
+    """What switches on the plants' faults of the row under way, and off those of the row before; it steps after the operator."""
+
+    operator: Operator
+    plants: tuple[Outside, ...]
+    _on: frozenset[str] = frozenset()
+
+    def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:  # noqa: ARG002  # as all outside
+        """Publish nothing."""
+        wanted = self.operator.faults
+        for fault in sorted(self._on ^ wanted):
+            switch(self.plants, fault, on=fault in wanted)
+        self._on = wanted
+        return {}
+
+
+@dataclass(slots=True)
 class Together:
     """Operator and plants.
 
@@ -48,7 +65,6 @@ class Together:
     _between: dict[str, Values] = field(default_factory=dict)
     _set: dict[str, Values] = field(default_factory=dict)
     _written: int = 0
-    _on: frozenset[str] = frozenset()
 
     @property
     def over(self) -> bool:
@@ -73,7 +89,6 @@ class Together:
             return latest(name) if name in self.shared else self._between.get(name)
 
         published = {} if self.operator is None else dict(self.operator.step(tick, seen))
-        self._switch()
         published |= {name: values for part in self.others for name, values in part.step(tick, seen).items()}
         self._between |= {name: values for name, values in published.items() if name not in self.shared}
         self._write()
@@ -144,13 +159,6 @@ class Together:
     def grade(self, fault: str, strength: float) -> None:
         """Switch a fault on, with a strength."""
         switch(self.others, f"{fault}={strength}", on=True)
-
-    def _switch(self) -> None:
-        """Switch on the faults of the row under way, and off those of the row before."""
-        wanted = self.operator.faults if isinstance(self.operator, ScriptOperator) else frozenset()
-        for fault in sorted(self._on ^ wanted):
-            switch(self.others, fault, on=fault in wanted)
-        self._on = wanted
 
     def _write(self) -> None:
         if self.operator is None or self.results is None:

@@ -15,7 +15,7 @@ from rcsc.run.levels import Query
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.script import outside_buffers, read_script, script_path
 from rcsc.run.orders.stopped import Restorable, StoppedRuns
-from rcsc.run.orders.together import Together
+from rcsc.run.orders.together import RowFaults, Together
 from rcsc.run.plant.load import load
 from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Signature
@@ -76,14 +76,15 @@ def together(
         for buffer in outside_buffers(system, signs)
     }
     shared = frozenset(wire.source for wire in system.wires)
-    return Together(stage.operator, stage.outside, first, shared, results)
+    faults = () if stage.operator is None else (RowFaults(stage.operator, stage.outside),)
+    return Together(stage.operator, (*faults, *stage.outside), first, shared, results)
 
 
 def standing(stage: Staged, system: Description, signs: Mapping[str, Signature]) -> tuple[Outside, ...]:
     """Return the parts outside in one process; a plant that reads its own scripts knows what its parts say to each other."""
     if stage.operator is None or isinstance(stage.operator, ScriptOperator):
         return (together(stage, system, signs),)
-    return (stage.operator, *stage.outside)
+    return (stage.operator, RowFaults(stage.operator, stage.outside), *stage.outside)
 
 
 def outside(order: StageOrder, results: str, first: int = 0) -> list[Outside]:

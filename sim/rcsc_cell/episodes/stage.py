@@ -43,11 +43,12 @@ def _staged(setup: Setup, backend: "Backend") -> Staged:
 
     if not setup.script:
         return Staged((plant(database, backend, seed=setup.seed),), database.queries)
+    from rcsc_cell.cell.faults import Faults
     from rcsc_cell.cell.reach import checked
     from rcsc_cell.episodes.witness import Witness, timed
 
     folder = setup.spec.folder
-    rows = read_script(script_path(setup.script, folder))
+    rows = read_script(script_path(setup.script, folder), tuple(Faults()))
     station = workstation(rows, database.locations, setup.signs["task"], safe_places(database))
     checked(database, open_cache(folder))
     world = timed(plant(database, backend, seed=setup.seed))

@@ -1,15 +1,16 @@
 """Scripts as data: one row a command, as Fig. 7 prints them.
 
-In: a CSV file with the columns command, part, source, dest, end_at. Out: rows, or what is wrong with them, by row.
+In: a CSV file with the columns command, part, source, dest, end_at and, where rows meet faults of the cell, fault. Out: rows, or what is
+wrong with them, by row.
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc.base.host.files.read import MIB, Malformed, rows_of, text
-from rcsc.run.orders.script import BadScript
+from rcsc.run.orders.script import FAULT, BadScript, faults_in
 
 COLUMNS = ("command", "part", "source", "dest", "end_at")
 ROBOT = ("acquire", "move", "release", "transfer", "clear", "pause")
@@ -27,6 +28,7 @@ class ScriptRow:
         robot: TASK's command; empty for the vise and the machine.
         vise: What each jaw is to do: `right` and `left`, True to open.
         machine: What the machine is to do.
+        faults: The cell's faults that are on while it is under way.
     """
 
     number: int
@@ -40,34 +42,40 @@ class ScriptRow:
     dest: str = ""
     end_at: str = ""
     sector: int = 0
+    faults: tuple[str, ...] = ()
 
 
-def read_script(path: Path) -> tuple[ScriptRow, ...]:
+def read_script(path: Path, faults: Sequence[str] = ()) -> tuple[ScriptRow, ...]:
     """Read the rows of a script.
+
+    Args:
+        path: The CSV file.
+        faults: The names of the cell's faults.
 
     Raises:
         BadScript: The file cannot be read, or a row says nothing that a workstation can do.
     """
     try:
-        return script_rows(text(path, MIB), f"{path}")
+        return script_rows(text(path, MIB), f"{path}", faults)
     except OSError as error:
         raise BadScript(f"{path} cannot be read: {error.strerror}") from error
     except Malformed as error:
         raise BadScript(f"{path}: {error}") from error
 
 
-def script_rows(said: str, where: str) -> tuple[ScriptRow, ...]:
+def script_rows(said: str, where: str, faults: Sequence[str] = ()) -> tuple[ScriptRow, ...]:
     """The rows of a script's text; `where` names it in what is said of it.
 
     Raises:
         BadScript: A row says nothing that a workstation can do.
         Malformed: It has other columns.
     """
-    lines = rows_of(said, COLUMNS)
+    lines = rows_of(said, COLUMNS, (FAULT,))
     rows, wrong = [], []
     for number, line in enumerate(lines, 1):
         try:
-            rows.append(_row(number, {key: value.strip() for key, value in line.items()}))
+            row = _row(number, {key: value.strip() for key, value in line.items()})
+            rows.append(replace(row, faults=faults_in(line.get(FAULT, ""), faults)))
         except ValueError as error:
             wrong.append(f"{where}, row {number}: {error}")
     if wrong:

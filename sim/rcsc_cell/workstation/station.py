@@ -112,6 +112,11 @@ class Workstation:
         return self._paused < 0
 
     @property
+    def faults(self) -> frozenset[str]:
+        """The cell's faults that the row under way switches on."""
+        return frozenset() if self.over else frozenset(self.rows[self.at].faults)
+
+    @property
     def stopped(self) -> RowResult[ScriptRow] | None:
         """The result that stopped the script."""
         last = self.results[-1] if self.results else None

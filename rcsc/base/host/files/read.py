@@ -281,16 +281,17 @@ def _shallow() -> Any:
     return Shallow()
 
 
-def rows_of(text: str, columns: Sequence[str]) -> list[dict[str, str]]:
-    """Return the rows of a CSV text with a heading.
+def rows_of(text: str, columns: Sequence[str], maybe: Sequence[str] = ()) -> list[dict[str, str]]:
+    """Return the rows of a CSV text with a heading: these columns, and after them those that may be there, or none of them.
 
     Raises:
         Malformed: It is no CSV, or has other columns.
     """
     table = csv.DictReader(io.StringIO(text, newline=""))
     try:
-        if tuple(table.fieldnames or ()) != tuple(columns):
-            raise Malformed(f"the columns are {', '.join(columns)}")
+        if tuple(table.fieldnames or ()) not in {tuple(columns), (*columns, *maybe)}:
+            or_more = f", and {', '.join(maybe)} where it is needed" if maybe else ""
+            raise Malformed(f"the columns are {', '.join(columns)}{or_more}")
         return [{key: value or "" for key, value in row.items() if key} for row in table]
     except csv.Error as error:
         raise Malformed(f"is no CSV file: {error}") from error
