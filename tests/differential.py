@@ -1037,6 +1037,64 @@ class Maker:
         self.bodies[f"table {name}"] = "\n".join(rows)
         made.tables.append(Table(name, tuple(lines), default, assuming, stops))
 
+    def turned(self) -> None:
+        """A table that is printed the other way round: a matrix, or one with a column for each result; its lines row by row."""
+        rng, made, name = self.rng, self.made, self.name("t")
+        self.back = rng.randrange(2) == 0
+        leaves = self.readable()
+        columns = rng.sample(leaves, min(rng.randint(1, 2), len(leaves)))
+        by = rng.choice(leaves) if rng.randrange(2) else None
+        given = rng.choice([None, *self.shown])
+        across = [self.column(by, given) for _ in range(rng.randint(1, 3))]
+        names = [self.name("c") for _ in across]
+        heads = [f"{one} : {text}" for one, (text, _, _) in zip(names, across, strict=True)]
+        rows = [f"| line | {' | '.join(leaf.name for leaf in columns)} || {' | '.join(heads)} |"]
+        lines: list[Line] = []
+        for _ in range(rng.randint(1, 3)):
+            left = [self.cell(leaf) for leaf in columns]
+            texts = []
+            for _, test, does in across:
+                if by is None:
+                    when = self.possible((self.truth(1), None)[rng.randrange(2)])
+                    says, tests, do = when.text if when else rng.choice(("", "-", "false")), (when,), does
+                else:
+                    says, do = self.result(given)
+                    tests = (test,)
+                texts.append(says)
+                if says not in ("", "-", "false") or (by is not None and says == "false"):
+                    whole = tuple(one for one in (*(one for _, one in left), *tests) if one is not None)
+                    lines.append(Line(whole, do, frozenset()))
+            rows.append(
+                f"| {self.name('l')} | {' | '.join(text for text, _ in left)} || {' | '.join(texts)} |"
+            )
+        default = None
+        if not lines or rng.randrange(3):
+            text, default = self.result(given)
+            rows.append(f"| {self.name('rest')} | DEFAULT {'| ' * (len(columns) - 1)}|| {text} |")
+        self.back = False
+        said = "procedures" if given is None else given.name
+        made.text += [f"table {name} {f'by {by.name} ' if by else ''}giving {said} {{", *rows, "}"]
+        self.bodies[f"table {name}"] = "\n".join([said, *([by.name] if by else []), *rows])
+        made.tables.append(Table(name, tuple(lines), default, (), ()))
+
+    def column(self, by: Leaf | None, given: Leaf | None) -> tuple[str, Expr | None, tuple[Doing, ...]]:
+        """The heading of a column: a result, or a condition of what the columns are by, or after `when` any."""
+        if by is None:
+            text, does = self.result(given)
+            return text or "-", None, does
+        text, test = self.cell(by)
+        if text and self.rng.randrange(3):
+            return text, test, ()
+        test = self.truth(1)
+        return f"when {test.text}", test, ()
+
+    def result(self, given: Leaf | None) -> tuple[str, tuple[Doing, ...]]:
+        """What a line does: a call, or the value of an output."""
+        if given is None:
+            return self.actions(())
+        value = self.of_kind(given.kind, 1)
+        return value.text, (self._put(given.name, value),)
+
     def ordered(self, names: Sequence[str]) -> tuple[list[str], list[set[int]], dict[int, int]]:
         """What stands after the names of lines; the lines above each; of lines that do the same as an earlier one, which that is."""
         rng, count = self.rng, len(names)
@@ -1133,7 +1191,8 @@ class Maker:
             self.procedure()
         self.shown = self.only_lines(rng.randint(1, 2))
         for _ in range(rng.choice((1, 1, 2))):
-            self.table()
+            # Not from `rng`: the other draws of a seed stay what they were.
+            (self.table if random.Random(f"{made.text}").randrange(3) else self.turned)()
         self.level()
         return made
 

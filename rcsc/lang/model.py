@@ -762,6 +762,8 @@ class Table:
         stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
             Where one fails the cycle ends before the table is matched; the others only tell.
         meetings: Declarations about pairs of its lines, by name.
+        turned: Whether it is printed the other way round, so that a row has several lines, a column one condition or result.
+        unsaid: Of such a table, as lines that do nothing, its empty cells, or rows: where a line that is missing would stand.
     """
 
     name: TableName
@@ -776,6 +778,8 @@ class Table:
     stops: tuple[AssumptionName, ...] = ()
     meetings: tuple[Meeting, ...] = ()
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    turned: bool = field(default=False, compare=False, repr=False)
+    unsaid: tuple[Line, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def every_line(self) -> tuple[Line | Default, ...]:

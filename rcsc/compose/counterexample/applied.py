@@ -274,7 +274,7 @@ def assuming(text: str, name: str, condition: str) -> str | None:
     table = table_of(text, name)
     if table is None or _NEW in text:
         return None
-    past = table.named + len(name)
+    past = table.headed
     more = _ASSUMING.match(text, past)
     listed = (past, past, f" assuming {_NEW}") if more is None else (more.end(), more.end(), f"{_NEW}, ")
     stated = (table.start, table.start, f"assume {_NEW} monitored : {condition}\n")

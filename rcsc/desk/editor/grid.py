@@ -7,13 +7,15 @@ one variable, or at bits of one; assumptions are left out of the count.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import zip_longest
 
 from rcsc.desk.editor.places import Area, Lines
 from rcsc.desk.editor.values import Grid, GridCell, GridColumn, GridRow, Standing
 from rcsc.lang.model import Array, Bool, Enum, Int, Program, Record, Single, Table, Type, spell, unit_text
 from rcsc.lang.syntax.rows import REQUIREMENTS, Cell, Cells, stub_of
-from rcsc.lang.written.tables import RowText, WrittenTable, joined_cells, pieces, tables_of
+from rcsc.lang.syntax.turned import name_of
+from rcsc.lang.written.tables import RowText, WrittenPart, WrittenTable, joined_cells, pieces, tables_of
 from rcsc.proof.table.boxes import TableBoxes
 from rcsc.proof.table.regions.word_bits import words_of
 
@@ -50,16 +52,32 @@ def _grid(
 
     parts = written.parts
     heads = [joined_cells(part.heading) for part in parts]
-    columns = tuple(_columns(heads, table, program, areas))
+    columns = tuple(_columns(heads, None if written.turned else table, program, areas))
     shares = {} if program is None or table is None else shares_of(program, table)
     every = [part.lines for part in parts]
-    rows = tuple(
+    rows = [
         _row(file, lines, groups, heads, shares, areas)
         for groups in zip_longest(*every)
         if groups[0] is not None
-    )
+    ]
     name = lines.area(file, written.named, written.named + len(written.name))
-    return Grid(written.name, name, columns, rows, standing)
+    first = heads[0].conditions[0].text if heads and heads[0].conditions else "line"
+    if written.turned and heads:
+        rows = [_turned(row, parts, at, first == "line", table) for at, row in enumerate(rows)]
+    return Grid(written.name, name, columns, tuple(rows), standing, first)
+
+
+def _turned(row: GridRow, parts: Sequence[WrittenPart], at: int, named: bool, table: Table | None) -> GridRow:
+    """Return a row of a turned table with its name, which may be made of its conditions, and the lines whose cells stand in it."""
+    if not named:
+        tests = [cell.text for cell in row.cells[: len(joined_cells(parts[0].heading).conditions) - 1]]
+        row = replace(row, name="default" if row.default else name_of([row.stub.text, *tests]))
+    rows = [each for part in parts if at < len(part.lines) for each in part.lines[at]]
+    lines = () if table is None else table.every_line
+    found = [
+        str(line.name) for line in lines if any(each.start <= line.span.start < each.past for each in rows)
+    ]
+    return replace(row, lines=tuple(found))
 
 
 def _columns(
@@ -122,7 +140,7 @@ def _row(
     stub, conditions, actions = line_cells(groups, heads)
     every = tuple(GridCell(cell.text, areas(cell)) for cell in (*conditions, *actions))
     name = stub_of(stub).name.text
-    default = bool(conditions) and conditions[0].text.split()[:1] == ["DEFAULT"]
+    default = "DEFAULT" in (name, *(cell.text.split(" ")[0] for cell in conditions[:1]))
     return GridRow(
         name,
         every,
@@ -130,6 +148,7 @@ def _row(
         shares.get(name),
         lines.area(file, first[0].start, first[-1].past),
         GridCell(stub.text, areas(stub)),
+        (name,),
     )
 
 

@@ -147,6 +147,7 @@ class GridRow:
         default: Whether it is the DEFAULT line; it then has no conditions.
         share: How many of the inputs in the declared ranges it matches, and of how many; None where nobody counted.
         area: Its rows of the first part of the table.
+        lines: The names of the lines that stand in it: in a turned table one a cell.
     """
 
     name: str
@@ -155,6 +156,7 @@ class GridRow:
     share: tuple[int, int] | None
     area: Area
     stub: GridCell
+    lines: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +165,7 @@ class Grid:
 
     Attributes:
         name: What it is called; `area` is where that stands.
+        first: The heading of the first column: `line`, or of a turned table what its rows are by.
     """
 
     name: str
@@ -170,6 +173,7 @@ class Grid:
     columns: tuple[GridColumn, ...]
     rows: tuple[GridRow, ...]
     standing: Standing
+    first: str = "line"
 
 
 # --- the state of a table ---

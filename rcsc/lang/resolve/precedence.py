@@ -79,6 +79,7 @@ def expanded(written: tree.TableDecl, table: Table, *, apart: bool = False) -> t
     `apart` gives it the columns of the model, of which each looks at another variable.
     """
     rows = tuple(replace(row, above=(), same=()) for row in written.rows)
+    written = replace(written, turned=None)
     many = sum(not column.written for column in table.columns)
     if not many:
         return replace(written, rows=rows)

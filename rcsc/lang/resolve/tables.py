@@ -34,6 +34,7 @@ from rcsc.lang.resolve.precedence import with_precedence
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS, Bounds, Cell
+from rcsc.lang.syntax.turned import unsaid
 
 
 def table(scope: Scope, written: tree.TableDecl) -> Table:
@@ -78,6 +79,10 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
                 row.cells[1].span,
                 requirements(scope, row.requirements),
             )
+    missing = () if written.turned is None or default is not None else unsaid(written.turned)
+    empty = tuple(
+        Line(LineName(row.name), cells.tests(row), (), row.span, Bounds(row.cells)) for row in missing
+    )
     columns, resolved, meetings = with_precedence(scope, written, columns, tuple(lines))
     read = {name for line in resolved for test in line.stated for name in test.variables}
     return Table(
@@ -92,6 +97,8 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
         written.span.file,
         meetings=meetings,
         requirements=requirements(scope, written.requirements),
+        turned=written.turned is not None,
+        unsaid=empty,
     )
 
 

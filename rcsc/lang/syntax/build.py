@@ -18,11 +18,17 @@ _NUMBER_TYPES: dict[str, type[tree.IntType | tree.RealType | tree.SingleType]] =
 
 
 class Rows(Protocol):
-    """Parses the rows of a table."""
+    """Parses the rows of a table, and of one that is turned: then also what stands, from start to end, after `by` and `giving`."""
 
     def table(
         self, rows: list[Any]
     ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool]: ...
+
+    def turned(
+        self, rows: list[Any], by: tuple[int, int] | None, giving: tuple[int, int]
+    ) -> tuple[
+        tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool, tree.Turned | None
+    ]: ...
 
 
 class Build:
@@ -217,9 +223,13 @@ class Build:
         assuming = self._names(self._find(node.children, "names"))
         assert self.rows is not None
         rows = [item for item in node.children if getattr(item, "type", None) == "ROW"]
-        conditions, actions, lines, traced = self.rows.table(rows)
+        by, giving = (self._find(node.children, rule) for rule in ("columns_by", "giving"))
         name = self._name(node.children[0])
-        return tree.TableDecl(name, assuming, conditions, actions, lines, traced, **head)
+        if giving is None:
+            return tree.TableDecl(name, assuming, *self.rows.table(rows), **head)
+        subject = None if by is None else (by.start_pos + len("by"), by.end_pos)
+        given = giving.start_pos + len("giving"), giving.end_pos
+        return tree.TableDecl(name, assuming, *self.rows.turned(rows, subject, given), **head)
 
     def _link_decl(self, node: ParseNode) -> tree.LinkDecl:
         head = self._head(node)

@@ -8,7 +8,15 @@ from collections.abc import Iterator
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.layout import WIDTH, table_rows
-from rcsc.lang.syntax.spell import spell_expr, spell_field, spell_req, spell_set, spell_statement, spell_type
+from rcsc.lang.syntax.spell import (
+    spell_expr,
+    spell_field,
+    spell_req,
+    spell_set,
+    spell_statement,
+    spell_turned,
+    spell_type,
+)
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
@@ -221,7 +229,8 @@ def _if(branch: tree.If, depth: int, lead: str) -> Iterator[str]:
 
 def _table(table: tree.TableDecl, width: int) -> Iterator[str]:
     assuming = f" assuming {', '.join(name.text for name in table.assuming)}" if table.assuming else ""
-    yield f"table {table.name.text}{assuming}{spell_req(table)} {{"
+    turned = "" if table.turned is None else spell_turned(table.turned)
+    yield f"table {table.name.text}{turned}{assuming}{spell_req(table)} {{"
     for row, text in table_rows(table, width):
         if row is not None:
             yield from _above(row.comments, (), "  ")

@@ -11,13 +11,13 @@ column that gives a character for the fewest further rows gives it, until the ro
 """
 
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS, REQUIREMENTS
-from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_names, spell_statement
+from rcsc.lang.syntax.spell import spell_across, spell_action, spell_condition, spell_heading, spell_names
 
 WIDTH = 110
 _INDENT = 2
@@ -118,7 +118,9 @@ def _atoms(text: str, *, heading: bool) -> list[str]:
 
 def _stays(before: str, word: str, *, heading: bool) -> bool:
     """Return whether a word stays on the row of the word before it."""
-    if before in _BEFORE or word.startswith("["):
+    if (
+        before in _BEFORE or word.startswith("[") or ":" in (before, word)
+    ):  # `NAME : -`: a row of `: -` would be dashes
         return True
     return not heading and word in _OPERATORS
 
@@ -146,55 +148,70 @@ def _filled_last(atoms: Sequence[str], width: int) -> list[str]:
 
 def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | None, str]]:
     """Yield the rows of a table, each with the line whose comments stand above it, if any."""
-    columns = _columns(table)
-    names = ["line", *(row.stub for row in table.rows)]
-    again = ["line", *(row.name for row in table.rows)]
+    turned = table.turned
+    rows = table.rows if turned is None else turned.rows
+    columns = _columns(table) if turned is None else _turned_columns(turned, table)
+    if turned is None or turned.named:
+        names, again = ["line", *(row.stub for row in rows)], ["line", *(row.name for row in rows)]
+    else:
+        names = again = columns.pop(0).texts
     stub = max(map(len, names))
+    once = {} if turned is None else {at: row for at, row in enumerate(rows, 1) if row.default}
     for number, part in enumerate(_parts(columns, width - _INDENT, stub)):
         if number:
             yield None, ""
-        yield from _part(again if number else names, stub, part, () if number else table.rows)
+        yield from _part(again if number else names, stub, part, () if number else rows, once)
 
 
 def _columns(table: tree.TableDecl) -> list[_Column]:
-    left = [[_heading(heading, {"when"})] for heading in table.conditions]
-    right = [[_heading(heading, {*ACTION_WORDS, REQUIREMENTS})] for heading in table.actions]
+    left = [[spell_heading(heading, {"when"})] for heading in table.conditions]
+    right = [[spell_heading(heading, {*ACTION_WORDS, REQUIREMENTS})] for heading in table.actions]
     for row in table.rows:
-        for texts, text in zip(left, _conditions(row, table), strict=True):
+        for texts, text in zip(left, _conditions(row, table.conditions), strict=True):
             texts.append(text)
         for texts, cell in zip(right, row.actions, strict=True):
-            texts.append(_action(cell))
-    if table.traced:
-        right.append([REQUIREMENTS, *(spell_names(row.requirements) for row in table.rows)])
+            texts.append(spell_action(cell))
+    return _as_columns(left, right, table.rows if table.traced else None)
+
+
+def _turned_columns(turned: tree.Turned, table: tree.TableDecl) -> list[_Column]:
+    """Return the columns of a turned table; what its DEFAULT row does stands in none."""
+    left = [
+        [spell_heading(heading, {"when", *(() if turned.named else ("line",))})]
+        for heading in turned.conditions
+    ]
+    right = [[spell_across(across, turned)] for across in turned.across]
+    for row in turned.rows:
+        for texts, text in zip(left, _conditions(row, turned.conditions), strict=True):
+            texts.append(text)
+        for at, texts in enumerate(right):
+            cell = () if row.default else row.actions[at]
+            if turned.by is None and isinstance(cell, tree.Comparison):
+                texts.append(spell_condition(cell, True))
+            else:
+                texts.append(spell_action(cell))
+    return _as_columns(left, right, turned.rows if table.traced else None)
+
+
+def _as_columns(
+    left: list[list[str]], right: list[list[str]], traced: Sequence[tree.Row] | None
+) -> list[_Column]:
+    """Return columns, with one of requirements where lines are traced."""
+    if traced is not None:
+        right.append([REQUIREMENTS, *(spell_names(row.requirements) for row in traced)])
     return [_Column(texts, at < len(left)) for at, texts in enumerate((*left, *right))]
 
 
-def _heading(heading: tree.Heading, words: Collection[str]) -> str:
-    """Return a heading; a variable called like one of the words stands in parentheses."""
-    if heading.subject is None:
-        return heading.word
-    text = spell_expr(heading.subject)
-    return f"({text})" if text in words else text
-
-
-def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
+def _conditions(row: tree.Row, headings: Sequence[tree.Heading]) -> list[str]:
     if row.default:
         return [
             "DEFAULT unreachable" if row.unreachable else "DEFAULT",
-            *([""] * (len(table.conditions) - 1)),
+            *([""] * (len(headings) - 1)),
         ]
     return [
         "" if cell is None else spell_condition(cell, heading.subject is None)
-        for cell, heading in zip(row.conditions, table.conditions, strict=True)
+        for cell, heading in zip(row.conditions, headings, strict=True)
     ]
-
-
-def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
-    if isinstance(cell, tree.Comparison):
-        return spell_expr(cell.value)
-    return "; ".join(
-        spell_statement(statement) for statement in cell if isinstance(statement, tree.Assign | tree.Call)
-    )
 
 
 # --- widths --------------------------------------------------------------------------
@@ -291,18 +308,43 @@ def _rows_of(parts: Sequence[Sequence[_Column]]) -> int:
 
 
 def _part(
-    names: Sequence[str], stub: int, columns: Sequence[_Column], rows: Sequence[tree.Row]
+    names: Sequence[str],
+    stub: int,
+    columns: Sequence[_Column],
+    rows: Sequence[tree.Row],
+    once: Mapping[int, tree.Row],
 ) -> Iterator[tuple[tree.Row | None, str]]:
+    """Yield the rows of a part; those that stand `once` have one cell after `||`, and none in further parts, which have no `rows`."""
     texts = [column.pieces(column.width) for column in columns]
     for number, name in enumerate(names):
         pieces = [broken[number] for broken in texts]
         above = rows[number - 1] if rows and number else None
+        if number in once:
+            found = _default_row(name, stub, once[number], pieces, columns) if rows else ()
+            yield from ((None if at else above, text) for at, text in enumerate(found))
+            continue
         for at in range(max(map(len, pieces), default=1)):
             shown = [piece[at] if at < len(piece) else "" for piece in pieces]
             yield above if not at else None, _row(name if not at else "", stub, shown, columns)
         if not number:
             dashes = ["-" * column.width for column in columns]
             yield None, _row("-" * stub, stub, dashes, columns).replace(" ", "-")
+
+
+def _default_row(
+    name: str, stub: int, row: tree.Row, pieces: Sequence[Sequence[str]], columns: Sequence[_Column]
+) -> Iterator[str]:
+    """Yield the rows of the DEFAULT row of a turned table: what it does, over all columns, and its requirements."""
+    tests = [column for column in columns if column.is_condition]
+    wide = [column.width for column in columns if not column.is_condition and column.texts[0] != REQUIREMENTS]
+    says = [spell_action(row.actions[0]).ljust(sum(wide) + 3 * (len(wide) - 1))]
+    if row.requirements:
+        traced = next((column.width for column in columns if column.texts[0] == REQUIREMENTS), 0)
+        says.append(spell_names(row.requirements).ljust(traced))
+    for at in range(max((len(piece) for piece in pieces[: len(tests)]), default=1)):
+        shown = [piece[at] if at < len(piece) else "" for piece in pieces[: len(tests)]]
+        yield f"{_row('' if at else name, stub, shown, tests)} {' | '.join(says)} |"
+        says = [" " * len(text) for text in says]
 
 
 def _row(name: str, stub: int, texts: Sequence[str], columns: Sequence[_Column]) -> str:

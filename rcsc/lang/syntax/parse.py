@@ -26,18 +26,21 @@ from rcsc.lang.syntax.rows import (
     BITS,
     CALL,
     CALL_UNDER,
+    COLUMNS,
     EMPTY_CELL,
     IN_QUOTES,
     MARKS,
     NAMED_FIELDS,
     NEW_PART,
     NO_HEADING,
+    ONCE,
     ONE_GROUP,
     ORDER,
     PARTED,
     PIECES,
     PLAIN,
     REQUIREMENTS,
+    ROW_NAMES,
     SAME_LINES,
     STUB,
     TO_WHOM,
@@ -45,12 +48,14 @@ from rcsc.lang.syntax.rows import (
     Cells,
     LineCells,
     Side,
+    Stub,
     conjuncts,
     cut,
     joined,
     parts,
     stub_of,
 )
+from rcsc.lang.syntax.turned import NAMELESS_DEFAULT, NAMES_APART, NOTHING, crossed, heading_of, name_of
 
 MOST_ERRORS = 20
 MOST_CONJUNCTS = 100
@@ -218,6 +223,11 @@ def _says_default(cell: Cell) -> bool:
     return cell.text.startswith("DEFAULT") and cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
 
 
+def _once(cells: Cells, *, named: bool) -> bool:
+    """Return whether a row of a turned table is DEFAULT, whose cell after `||` is for all columns."""
+    return len(cells.conditions) > named and _says_default(cells.conditions[named])
+
+
 @dataclass(frozen=True, slots=True)
 class _Line:
     """A line of a table: its first row, from start to end, its cells of one part or of all, and its comments."""
@@ -288,6 +298,139 @@ class _Rows:
         named = tuple(self._row(line, conditions, actions, traced) for line in lines)
         return conditions, actions, named, traced is not None
 
+    def turned(
+        self, rows: list[ParseLeaf], by: tuple[int, int] | None, giving: tuple[int, int]
+    ) -> tuple[
+        tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...], bool, tree.Turned | None
+    ]:
+        """Return the same of a table that is turned, and how it is printed; nothing after an error."""
+        sound = len(self.diagnostics)
+        subject = None if by is None else self._heading(self._between(*by), "when")
+        given = self._heading(self._between(*giving), "")
+        read = [self._part(groups[0], groups[1:], turned=True) for groups in parts(rows)]
+        heads = [part[0] for part in read if part is not None]
+        named = bool(heads) and heads[0].conditions[0].text == "line"
+        if len(heads) == len(read) and len(self.diagnostics) == sound:
+            lines = self._across_parts([part[1] for part in read if part is not None], heads, named=named)
+            cells = [cell for at, head in enumerate(heads) for cell in head.conditions[named or at > 0 :]]
+            conditions = tuple(self._heading(cell, "when") for cell in cells)
+            headings = [cell for head in heads for cell in head.actions]
+            traced = self._traced(headings)
+            columns = [cell for at, cell in enumerate(headings) if at != traced]
+            across = tuple(self._column(cell, subject, given) for cell in columns)
+            if not across:
+                self._report(Code.SYNTAX, "this table has no column after `||`", heads[0].last, COLUMNS)
+            shape = tree.Turned(subject, given, named, conditions, across, ())
+            shape = replace(shape, rows=tuple(self._turned_row(line, shape, traced) for line in lines))
+            if len(self.diagnostics) == sound:
+                crossing = crossed(shape)
+                self._report_twice([(each.name, each.place, "columns") for each in across])
+                self._report_twice([(each.name, each.cells[0], "rows") for each in shape.rows])
+                if len(self.diagnostics) == sound:
+                    self._report_twice([(each.name, each.cells[0], "cells") for each in crossing[2]])
+                return *crossing, traced is not None, shape
+        return (), (), (), False, None
+
+    def _between(self, start: int, end: int) -> Cell:
+        """Return what stands between two places, as the cell of a heading."""
+        text = self.source.text[start:end]
+        return Cell(text.strip(), self.source.name, start + len(text) - len(text.lstrip()))
+
+    def _across_parts(self, read: list[list[_Line]], heads: list[Cells], *, named: bool) -> list[_Line]:
+        """Return the rows of a turned table, each with its cells of all parts; DEFAULT stands in the first alone."""
+        first, *more = read
+        once = [_once(line.cells, named=named) for line in first]
+        others = [line for line, alone in zip(first, once, strict=True) if not alone]
+        for line, alone in zip(first[:-1], once, strict=False):
+            if alone:
+                self._report(
+                    Code.DEFAULT_ELSEWHERE, "DEFAULT is the last row", line.cells.conditions[0], ONCE
+                )
+        whole = iter(self._across([others, *more], heads))
+        return (
+            []
+            if self.diagnostics
+            else [line if alone else next(whole) for line, alone in zip(first, once, strict=True)]
+        )
+
+    def _column(self, cell: Cell, subject: tree.Heading | None, given: tree.Heading) -> tree.Across:
+        """Return a column of a turned table, of its heading."""
+        stub, said, whole = heading_of(cell, of=subject is not None and subject.subject is not None)
+        marks = Stub(Cell("", "", 0)) if stub is None else stub_of(stub)
+        what: tree.Condition | tuple[tree.Statement, ...] = ()
+        if subject is None and said.text:
+            what = self._action(said.blank(), given)
+        elif subject is None or not said.blank().text:
+            self._report(Code.SYNTAX, "this column has no heading", cell, COLUMNS)
+        elif _says_default(said):
+            self._report(Code.DEFAULT_ELSEWHERE, "no column is DEFAULT", said, ONCE)
+        else:
+            heading = tree.Heading(None, "when", cell) if whole else subject
+            what = self._condition(said, heading) or ()
+        name = marks.name.text or (NOTHING if said.text == "-" else name_of([said.text]))
+        above, same = (
+            tuple(tree.Name(each.text, each.span) for each in of) for of in (marks.above, marks.same)
+        )
+        return tree.Across(name, what, stub is not None, whole, above, same, said, cell)
+
+    def _turned_row(self, line: _Line, shape: tree.Turned, traced: int | None) -> tree.Row:
+        cells = line.cells
+        tests = [cell.blank() for cell in cells.conditions[shape.named :]]
+        default = self._default(tests)
+        stub = stub_of(cells.conditions[0].blank()) if shape.named else Stub(cells.conditions[0])
+        name = NAMELESS_DEFAULT if default is not None else name_of([cell.text for cell in tests])
+        name = stub.name.text if shape.named else name
+        if default is None:
+            required = cells.actions[traced] if traced is not None else None
+            does = [cell.blank() for at, cell in enumerate(cells.actions) if at != traced]
+            actions = tuple(
+                self._action(cell, shape.giving) if shape.by is not None else self._says(cell)
+                for cell in does
+            )
+        else:
+            said = [cell for each in cells.actions if (cell := each.blank()).text]
+            required = next((cell for cell in said if cell.text.startswith('"')), None)
+            does = [cell for cell in said if cell is not required]
+            for cell in does[1:]:
+                self._report(
+                    Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT row has one cell after `||`", cell, ONCE
+                )
+            does = does[:1] or [Cell("", self.source.name, line.end)]
+            tests += [Cell("", self.source.name, line.end)] * (len(shape.conditions) - len(tests))
+            actions = (self._action(does[0], shape.giving),)
+        return tree.Row(
+            name,
+            tuple(
+                None if default is not None else self._condition(cell, heading)
+                for cell, heading in zip(tests, shape.conditions, strict=True)
+            ),
+            actions,
+            default is not None,
+            default is not None and default.text.endswith("unreachable"),
+            Span(self.source.name, line.start, line.end),
+            (stub.name, *tests, *does),
+            line.comments,
+            tuple(tree.Name(lower.text, lower.span) for lower in stub.above),
+            tuple(tree.Name(other.text, other.span) for other in stub.same),
+            () if required is None else self._requirements(required.blank()),
+        )
+
+    def _says(self, cell: Cell) -> tree.Comparison | tuple[tree.Statement, ...]:
+        """Return the condition in a cell below a result."""
+        if _says_default(cell):
+            self._report(Code.DEFAULT_ELSEWHERE, "this cell is a condition", cell, ONCE)
+        return cast("tree.Comparison | None", self._condition(cell, tree.Heading(None, "when", cell))) or ()
+
+    def _report_twice(self, named: Sequence[tuple[str, Cell, str]]) -> None:
+        """Report names that two rows, columns or cells of a turned table have."""
+        first: dict[str, Cell] = {}
+        for name, cell, kind in named:
+            if name in first:
+                label = Label(first[name].span, "the first")
+                wrong = _error(Code.DUPLICATE_LINE, f"two {kind} are called `{name}`", cell.span, NAMES_APART)
+                self.diagnostics.append(replace(wrong, related=(label,)))
+            first.setdefault(name, cell)
+
     def _traced(self, headings: Sequence[Cell]) -> int | None:
         """Return the position of the column of requirements among those after `||`."""
         traced = [at for at, cell in enumerate(headings) if cell.text == REQUIREMENTS]
@@ -295,22 +438,34 @@ class _Rows:
             self._report(Code.SYNTAX, "a table has at most one column `req`", headings[at], IN_QUOTES)
         return traced[0] if traced else None
 
-    def _part(self, head: list[ParseLeaf], groups: list[list[ParseLeaf]]) -> tuple[Cells, list[_Line]] | None:
-        """Return the heading of a part, and its lines."""
+    def _part(
+        self, head: list[ParseLeaf], groups: list[list[ParseLeaf]], *, turned: bool = False
+    ) -> tuple[Cells, list[_Line]] | None:
+        """Return the heading of a part, and its lines; a table that is turned may begin with another heading than `line`."""
         cells = self._whole(head)
         if cells is None:
             return None
-        if cells.conditions[0].text != "line":
+        named = cells.conditions[0].text == "line"
+        if not named and not turned:
             self._report(Code.SYNTAX, "the first heading of a table is `line`", cells.conditions[0])
-        lines = [line for rows in groups if (line := self._line(rows, cells)) is not None]
+        lines = [
+            line
+            for rows in groups
+            if (line := self._line(rows, cells, turned=turned, named=named or not turned)) is not None
+        ]
         return cells, lines
 
-    def _line(self, rows: list[ParseLeaf], head: Cells) -> _Line | None:
+    def _line(self, rows: list[ParseLeaf], head: Cells, *, turned: bool, named: bool) -> _Line | None:
         cells = self._whole(rows)
-        if cells is None or not self._even(rows[0], cells, head, "the heading"):
+        once = turned and cells is not None and _once(cells, named=named)
+        if cells is None or not self._even(
+            rows[0], cells, replace(head, actions=cells.actions) if once else head, "the heading"
+        ):
             return None
         stub = cells.conditions[0]
-        if not STUB.match(stub.text):
+        if not named and not stub.blank().text:
+            self._report(Code.SYNTAX, "this row begins without a condition", stub, ROW_NAMES)
+        if named and not STUB.match(stub.text):
             helps = (MARKS,) if " " in stub.text else ()
             self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", stub, *helps)
         comments = tuple(words(text) for row in rows for text in self.comments.take(row.start_pos))

@@ -20,7 +20,6 @@ REQUIREMENTS = "req"
 """The heading of the column of requirements, which is neither a condition nor an action."""
 SEPARATOR = re.compile(r"\|[\s|:-]*-[\s|:-]*$")
 GOES_ON = re.compile(r"\|[ \t]*\|")
-AGAIN = re.compile(r"\|[ \t]*line[ \t]*\|")
 STUB = re.compile(r"(?P<name>\w+)(\s+(above|same)\s+\w+(\s*,\s*\w+)*)*$", re.ASCII)
 """The first cell of a line: its name, the lines above which it stands, and those that do the same."""
 _MARK = re.compile(r"\s+(above|same)\s+(\w+(?:\s*,\s*\w+)*)", re.ASCII)
@@ -44,6 +43,9 @@ PARTED = "`|` parts cells: values and masks are listed with `,`, conditions join
 NO_HEADING = (
     "each column has a heading: a variable or an expression, `when`, after `||` a variable or `procedures`"
 )
+COLUMNS = "each column of such a table is headed by a result, or by a condition where the table says `by` what; `NAME : ...` names it"
+ONCE = "a DEFAULT row is for all that no cell takes: what it does stands once, after `||`"
+ROW_NAMES = "a first column `line` names the rows: then any of their conditions may be left out"
 NEW_PART = "a heading that begins another part of the table has a row `|---|` below it"
 PIECES = (
     "a row with an empty first cell goes on with the cells of the row above it; a line has its name there"
@@ -330,8 +332,8 @@ def is_separator(row: str) -> bool:
 def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
     """Return the rows of each part of a table: first its heading's, then those of each line.
 
-    A part begins with a heading, which is the first row, and later one whose first cell is `line` with a separator below. A row
-    that goes on with the one above stands with it.
+    A part begins with a heading, which is the first row, and later one whose first cell is that of the first, mostly `line`, with
+    a separator below. A row that goes on with the one above stands with it.
 
     >>> parts(["| line | a ||", "|--|--||", "| x | 1 ||", "| | 2 ||", "| line || b |", "|--||--|", "| x || 3 |"])
     [[['| line | a ||'], ['| x | 1 ||', '| | 2 ||']], [['| line || b |'], ['| x || 3 |']]]
@@ -341,7 +343,7 @@ def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
     for row in rows:
         if is_separator(row):
             last = found[-1]
-            if len(last) > 1 and not whole and AGAIN.match(last[-1][0]):
+            if len(last) > 1 and not whole and _first(last[-1][0]) == _first(found[0][0][0]):
                 found.append([last.pop()])
             whole = True
         elif found[-1] and not whole and GOES_ON.match(row):
@@ -350,6 +352,15 @@ def parts(rows: Sequence[_Row]) -> list[list[list[_Row]]]:
             found[-1].append([row])
             whole = False
     return found
+
+
+def _first(row: str) -> str:
+    """Return the text of a row's first cell.
+
+    >>> _first("| line | a ||")
+    'line'
+    """
+    return row[1:].partition("|")[0].strip()
 
 
 def joined(cells: Cells, more: Cells, above: Cells) -> Cells | Cell:

@@ -1,6 +1,6 @@
 """Expressions, types and conditions as text, with no more parentheses than are needed."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import assert_never
 
 from rcsc.lang.operator_table import (
@@ -16,6 +16,7 @@ from rcsc.lang.operator_table import (
     Op,
 )
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import ACTION_WORDS
 
 
 def spell_names(names: Iterable[tree.Name]) -> str:
@@ -229,3 +230,47 @@ def spell_statement(statement: tree.Assign | tree.Call) -> str:
     return statement.name.text + (
         f"({', '.join(spell_expr(arg) for arg in statement.args)})" if statement.args else ""
     )
+
+
+def spell_action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
+    """Return an action cell as text: a value, or calls and assignments."""
+    if isinstance(cell, tree.Comparison):
+        return spell_expr(cell.value)
+    return "; ".join(
+        spell_statement(statement) for statement in cell if isinstance(statement, tree.Assign | tree.Call)
+    )
+
+
+def spell_heading(heading: tree.Heading, words: Collection[str]) -> str:
+    """Return a heading; a variable called like one of the words stands in parentheses."""
+    if heading.subject is None:
+        return heading.word
+    text = spell_expr(heading.subject)
+    return f"({text})" if text in words else text
+
+
+def spell_turned(turned: tree.Turned) -> str:
+    """Return what a turned table says after its name, with a blank before it."""
+    words = (("by", turned.by, {"when"}), ("giving", turned.giving, ACTION_WORDS))
+    return "".join(
+        f" {word} {spell_heading(heading, own)}" for word, heading, own in words if heading is not None
+    )
+
+
+def spell_across(across: tree.Across, turned: tree.Turned) -> str:
+    """Return the heading of a column of a turned table."""
+    if turned.by is None:
+        said = spell_action(across.said) if isinstance(across.said, tuple | tree.Comparison) else ""
+        said = said or "-"
+    else:
+        whole = across.whole or turned.by.subject is None
+        said = "" if isinstance(across.said, tuple) else spell_condition(across.said, whole)
+        if (
+            said.startswith("when ") and turned.by.subject is not None and not across.whole
+        ):  # a variable's name
+            said = f"{'in' if isinstance(across.said, tree.Between) else '='} {said}"
+    said = f"when {said}" if across.whole else said
+    if not across.given:
+        return said
+    stub = tree.marked(across.name, across.above, across.same)
+    return stub if stub != across.name and said == across.name else f"{stub} : {said}"

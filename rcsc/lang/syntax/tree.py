@@ -473,6 +473,13 @@ class Happens:
 Condition: TypeAlias = Comparison | OneOf | Between | Lasting | Happens
 
 
+def marked(name: str, above: Sequence[Name], same: Sequence[Name]) -> str:
+    """Return a name and the marks `above` and `same`."""
+    marks = (("above", above), ("same", same))
+    said = (f"{word} {', '.join(other.text for other in names)}" for word, names in marks if names)
+    return " ".join((name, *said))
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
     """A line of a table.
@@ -507,9 +514,7 @@ class Row:
     @property
     def stub(self) -> str:
         """The first cell: the name, and the marks `above` and `same`."""
-        marks = (("above", self.above), ("same", self.same))
-        said = (f"{word} {', '.join(name.text for name in names)}" for word, names in marks if names)
-        return " ".join((self.name, *said))
+        return marked(self.name, self.above, self.same)
 
 
 @dataclass(frozen=True, slots=True)
@@ -524,6 +529,50 @@ class Heading:
     subject: Expr | None
     word: str = ""
     cell: Cell = field(default=Cell("", "", 0), compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Across:
+    """A column of a turned table: a line that lies on its side.
+
+    Attributes:
+        name: The name given to it, or made of its heading.
+        given: Whether it is given.
+        said: A condition of what the columns are by, or the action that is its result.
+        whole: Whether `said` is a condition by itself, after `when`.
+        cell: Where `said` stands; `place` is the whole heading.
+        above, same: As of a `Row`; they name columns.
+    """
+
+    name: str
+    said: Condition | tuple[Statement, ...]
+    given: bool = False
+    whole: bool = False
+    above: tuple[Name, ...] = ()
+    same: tuple[Name, ...] = ()
+    cell: Cell = field(default=Cell("", "", 0), compare=False, repr=False)
+    place: Cell = field(default=Cell("", "", 0), compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Turned:
+    """A table as it is printed the other way round: `table name [by subject] giving place`.
+
+    Attributes:
+        by: What the columns' conditions are of; the cells are actions. None where the columns are results, and the cells conditions.
+        giving: The heading of the results.
+        named: Whether the first column is `line`; else names are made of the conditions.
+        conditions: The headings before `||`.
+        across: The columns after it, without `req`.
+        rows: Its rows. Their `actions` are their cells, those of DEFAULT the one action that it has.
+    """
+
+    by: Heading | None
+    giving: Heading
+    named: bool
+    conditions: tuple[Heading, ...]
+    across: tuple[Across, ...]
+    rows: tuple[Row, ...]
 
 
 # --- declarations --------------------------------------------------------------------
@@ -686,6 +735,7 @@ class TableDecl(Required):
 
     Attributes:
         traced: Whether it has a column `req`.
+        turned: How it is printed, where that is the other way round; all else is of the lines that this comes to.
     """
 
     name: Name
@@ -694,6 +744,7 @@ class TableDecl(Required):
     actions: tuple[Heading, ...]
     rows: tuple[Row, ...]
     traced: bool = False
+    turned: Turned | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ def with_proposal(source: Source, proposal: Proposal) -> str | None:
     text = source.text
     for change in proposal.changes:
         table = table_of(text, proposal.table)
-        splices = None if table is None else _splices(text, table, change)
+        splices = None if table is None or table.turned else _splices(text, table, change)
         if splices is None:
             return None
         text = spliced(text, splices)

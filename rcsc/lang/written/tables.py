@@ -13,7 +13,8 @@ from rcsc.lang.leaves import free_name
 from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
 
 _HEAD = re.compile(
-    r"^[ \t]*(?P<table>table)[ \t]+(?P<name>[A-Za-z_]\w*)(?:\s+assuming\s[\w\s,]*)?(?:\s*req\s*\"[^{}|\r\n]*)?\s*\{",
+    r"^[ \t]*(?P<table>table)[ \t]+(?P<name>[A-Za-z_]\w*)(?P<turned>\s+(?:by|giving)\s[^{}|]*?)?"
+    r"(?:\s+assuming\s[\w\s,]*)?(?:\s*req\s*\"[^{}|\r\n]*)?\s*\{",
     re.MULTILINE | re.ASCII,
 )
 """A level names its tables otherwise: without a brace, or `by` what."""
@@ -59,6 +60,7 @@ class WrittenTable:
         start: The offset of the word `table`.
         end: The offset after its brace, or where it ends without one.
         rows: All rows, in order.
+        headed: The offset after its name, and after what it is `by` and `giving` where it is turned.
     """
 
     name: str
@@ -66,6 +68,16 @@ class WrittenTable:
     start: int
     end: int
     rows: tuple[RowText, ...]
+    headed: int
+
+    @property
+    def turned(self) -> bool:
+        """Whether it is printed the other way round."""
+        return self.headed > self.named + len(self.name)
+
+    def once(self, cells: Cells) -> bool:
+        """Return whether a row is DEFAULT where that has one cell after `||`, for all columns."""
+        return self.turned and any(cell.text.startswith("DEFAULT") for cell in cells.conditions[:2])
 
     @property
     def parts(self) -> tuple[WrittenPart, ...]:
@@ -94,7 +106,8 @@ def tables_of(text: str) -> Iterator[WrittenTable]:
         end = len(text) if closing is None else closing.start() if closing["brace"] is None else closing.end()
         rows = tuple(RowText.at(row["row"], row.start("row")) for row in _ROW.finditer(text, head.end(), end))
         past = end
-        yield WrittenTable(head["name"], head.start("name"), head.start("table"), end, rows)
+        headed = head.end("turned" if head["turned"] else "name")
+        yield WrittenTable(head["name"], head.start("name"), head.start("table"), end, rows, headed)
 
 
 def table_of(text: str, name: str) -> WrittenTable | None:

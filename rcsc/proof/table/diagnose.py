@@ -17,6 +17,7 @@ from rcsc.base.diagnostics.diagnostic import (
     WitnessColumn,
     sort_key,
 )
+from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import (
     Box,
@@ -149,7 +150,9 @@ def _others(
             notes=_under(table, unproved),
             help=helps,
             severity=Severity.WARNING,
-            proposals=(Proposal(title, str(table.name), "no input falls to it", (change,), helps),),
+            proposals=()
+            if table.turned
+            else (Proposal(title, str(table.name), "no input falls to it", (change,), helps),),
         )
 
 
@@ -192,7 +195,8 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
     label = Label(table.lines[line].cell_span(-1))
     name = f"line `{table.lines[line].name}` of table `{table.name}`"
     if not assuming:
-        helps = ("delete the line, or correct its conditions",)
+        gone = "empty its cell" if table.turned else "delete the line"
+        helps = (f"{gone}, or correct its conditions",)
         uppers = (*table.lines[line].below, *table.lines[line].same)
         notes = (
             (f"wherever its cells hold one of these matches, which go before it: {names_of(uppers)}",)
@@ -200,9 +204,10 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
             else ()
         )
         without = Change(ChangeKind.NO_LINE, str(table.lines[line].name))
-        gone = Proposal(f"delete {name}", str(table.name), "no input matches it", (without,))
+        proposal = Proposal(f"delete {name}", str(table.name), "no input matches it", (without,))
         message = f"{name} can never match"
-        return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=(gone,))
+        proposals = () if table.turned else (proposal,)
+        return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=proposals)
     message = f"{name} matches only where an assumption fails"
     return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
 
@@ -222,7 +227,7 @@ def _overlap(program: Program, partings: Partings, overlap: Overlap, options: Op
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
     repair = None if options.brief else partings.best(overlap)
     effects = _effects(program, table, overlap, options)
-    proposals = () if options.brief else _proposals(table, (first, second), repair, effects)
+    proposals = () if options.brief or table.turned else _proposals(table, (first, second), repair, effects)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
@@ -317,13 +322,14 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
     share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
         repair = None if options.brief else new_line(program, table, gap)
-        if options.brief:
+        if options.brief and not table.turned:
             smt.leave_open("a line for a gap")
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
             Code.GAP,
             message,
             Label(table.span),
+            related=tuple(_unsaid(table, gap)),
             notes=notes,
             help=() if repair is None else (_adding(table, repair).said,),
             witnesses=columns,
@@ -347,6 +353,26 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
         more=_more(program, gap),
         severity=Severity.NOTE,
     )
+
+
+def _unsaid(table: Table, gap: Gap) -> Iterator[Label]:
+    """Yield the empty cell of a turned table, or its row, into which each input shown falls."""
+    known: set[int] = set()
+    for number, witness in enumerate(gap.witnesses):
+        here = next((line.cell_span(-1) for line in table.unsaid if _meets(line, witness)), None)
+        if here is not None and here.start not in known:
+            known.add(here.start)
+            yield Label(
+                here, f"{'this input' if len(gap.witnesses) == 1 else f'input {number + 1}'} falls here"
+            )
+
+
+def _meets(line: Line, witness: Witness) -> bool:
+    """Return whether a line's tests hold at an input, as far as it says what they look at."""
+    try:
+        return all(holds(test, witness) for test in line.tests if test is not None)
+    except (LookupError, *UNDEFINED):
+        return False
 
 
 def _adding(table: Table, row: NewLine) -> Proposal:

@@ -122,7 +122,12 @@ class Partings:
         return universe, lines_of(universe, self.table), assumptions_of(universe, self.program, self.table)
 
     def best(self, overlap: Overlap) -> PartingCell | None:
-        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines and loses no input."""
+        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines and loses no input.
+
+        None of a turned table, as its lines share the cells of their row and column.
+        """
+        if self.table.turned:
+            return None
         if self._boxes is None:
             return min(self._sums(overlap), key=lambda cell: cell.lost, default=None)
         cell = next(iter(self.cells(overlap)), None)
@@ -135,7 +140,7 @@ class Partings:
         all keys that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
         """
         decided, table = self._boxes, self.table
-        if decided is None:
+        if decided is None or table.turned:
             return ()
         kinds: dict[str, Scalar] = self.program.kinds
         default = table.default is not None and not table.default.unreachable
@@ -309,7 +314,12 @@ class NewLine:
 
 
 def new_line(program: Program, table: Table, gap: Gap) -> NewLine | None:
-    """Return a line for the gap's first region; it overlaps none, and whether it closes the gap is counted, or proved."""
+    """Return a line for the gap's first region; it overlaps none, and whether it closes the gap is counted, or proved.
+
+    None for a turned table, which has no row for it.
+    """
+    if table.turned:
+        return None
     region, witness = gap.regions[0], gap.witnesses[0]
     row = None
     words = words_of(program, table)

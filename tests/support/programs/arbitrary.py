@@ -3,11 +3,15 @@
 from dataclasses import replace
 from functools import cache
 
+from hypothesis import assume
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import Cell
+from rcsc.lang.syntax.spell import spell_across, spell_condition
 from rcsc.lang.syntax.tree import Name
+from rcsc.lang.syntax.turned import NAMELESS_DEFAULT, NOTHING, crossed, name_of
 
 NAMES = st.sampled_from(
     "a b long_name x1 status Z DEFAULT unreachable when line procedures status_out".split()
@@ -196,6 +200,58 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
     )
 
 
+@st.composite
+def turned_tables(draw: st.DrawFn) -> tree.TableDecl:
+    """A table printed the other way round: a matrix, or one with a column for each result."""
+    matrix, named = draw(st.booleans()), draw(st.booleans())
+    subjects = draw(_columns())
+    headings = tuple(tree.Heading(column, "when" if column is None else "") for column in subjects)
+    by = draw(st.sampled_from([tree.Heading(None, "when"), None])) if matrix else None
+    by = tree.Heading(draw(expressions())) if matrix and by is None else by
+    giving = draw(st.sampled_from([tree.Heading(None, "procedures"), None])) or tree.Heading(draw(places()))
+    actions: SearchStrategy[tuple[tree.Statement, ...] | tree.Comparison]
+    actions = _cells() if giving.subject is None else st.builds(tree.Comparison, st.just("="), expressions())
+    across = []
+    for number in range(draw(st.integers(1, 3))):
+        whole = by is not None and by.subject is not None and draw(st.booleans())
+        of = tree.Heading(None, "when") if whole or by is None else by
+        said = draw(actions) if by is None else _condition(draw, of)
+        column = tree.Across(f"c{number}", said, given=True, whole=whole, above=draw(FEW), same=draw(FEW))
+        if draw(st.booleans()):
+            shape = tree.Turned(by, giving, named, (), (), ())
+            bare = replace(column, given=False, above=(), same=())
+            text = spell_across(bare, shape).removeprefix("when " if whole else "")
+            column = replace(bare, name=NOTHING if text == "-" else name_of([text]))
+        across.append(column)
+    rows = []
+    traced = draw(st.booleans())
+    for number in range(draw(st.integers(0, 3))):
+        default = number == 2 and draw(st.booleans())
+        conditions_ = tuple(
+            None if default or ((named or at) and draw(st.booleans())) else _condition(draw, heading)
+            for at, heading in enumerate(headings)
+        )
+        cells = [
+            draw(actions if matrix or default else st.builds(tree.Comparison, st.just("="), expressions()))
+            if draw(st.booleans())
+            else ()
+            for _ in range(1 if default else len(across))
+        ]
+        row = tree.Row(f"l{number}", conditions_, tuple(cells), default, default and draw(st.booleans()))
+        row = replace(row, comments=draw(WORDS), requirements=draw(REQUIREMENTS) if traced else ())
+        said_ = [
+            "" if each is None else spell_condition(each, heading.subject is None)
+            for each, heading in zip(conditions_, headings, strict=True)
+        ]
+        nameless = NAMELESS_DEFAULT if default else name_of(said_)
+        row = replace(row, above=draw(FEW), same=draw(FEW)) if named else replace(row, name=nameless)
+        rows.append(replace(row, cells=(Cell("", "", 0),) * (1 + len(conditions_) + len(cells))))
+    shape = tree.Turned(by, giving, named, headings, tuple(across), tuple(rows))
+    lines = crossed(shape)
+    assume(all(len({each.name for each in of}) == len(of) for of in (across, rows, lines[2])))
+    return tree.TableDecl(draw(NAMES), draw(FEW), *lines, traced, shape, comments=draw(WORDS))
+
+
 def _bare(statement: tree.Statement) -> tree.Statement:
     """Without comments: a cell has none."""
     if isinstance(statement, tree.Call):
@@ -354,7 +410,16 @@ def _roles() -> SearchStrategy[tree.Declaration]:
 
 @cache
 def declarations() -> SearchStrategy[tree.Declaration]:
-    return st.one_of(_names_of_things(), _variables_and_claims(), _procedures(), tables(), _roles(), levels())
+    """Any declaration."""
+    return st.one_of(
+        _names_of_things(),
+        _variables_and_claims(),
+        _procedures(),
+        tables(),
+        turned_tables(),
+        _roles(),
+        levels(),
+    )
 
 
 @cache

@@ -97,7 +97,7 @@ class _Complete:
         columns = () if grid is None else grid.columns
         heads = [part.heading for part in table.parts]
         if any(row in head for head in heads):
-            yield from self.heading(after)
+            yield from self.expression() if table.turned and after else self.heading(after)
             return
         part = next((part for part in table.parts if any(row in line for line in part.lines)), None)
         if part is None:

@@ -202,26 +202,57 @@ class _Walk:
         """Yield the names of a table: its headings, its lines, their cells."""
         yield self.name(Space.TABLE, node.name, node)
         yield from (self.name(Space.CLAIM, name) for name in node.assuming)
+        if node.turned is not None:
+            yield from self.turned(node.name.text, node.turned)
+            return
         for heading in (*node.conditions, *node.actions):
             yield from self.inside(heading.cell, self.exprs((heading.subject,)))
         for row in node.rows:
-            yield from self.row(node, row)
+            yield from self.row(node.name.text, row, [heading.word for heading in node.actions])
 
-    def row(self, table: tree.TableDecl, row: tree.Row) -> Iterator[Occurrence]:
+    def turned(self, owner: str, turned: tree.Turned) -> Iterator[Occurrence]:
+        """Yield the names of a table as it is printed, each where it stands; of rows and columns those that are given."""
+        for heading in (*turned.conditions, turned.giving, *(() if turned.by is None else (turned.by,))):
+            yield from self.inside(heading.cell, self.exprs((heading.subject,)))
+        word = turned.giving.word
+        for across in turned.across:
+            yield from self.marked(across, owner, across.place if across.given else None)
+            if isinstance(across.said, tuple):
+                yield from self.action(across.said, across.cell, word)
+            else:
+                yield from self.inside(across.cell, self.condition(across.said))
+        for row in turned.rows:
+            words = ("procedures" if turned.by is None and not row.default else word,) * len(row.actions)
+            yield from self.row(owner, row, words, named=turned.named)
+
+    def marked(self, line: tree.Row | tree.Across, owner: str, place: Cell | None) -> Iterator[Occurrence]:
+        """Yield a line's name, where it has a place, and those of others that its marks name."""
+        if place is not None:
+            span = place.at(0, len(line.name))
+            yield Occurrence(Space.LINE, line.name, span, owner, True, line)
+        yield from (self.name(Space.LINE, name, None, owner) for name in (*line.above, *line.same))
+
+    def row(
+        self, owner: str, row: tree.Row, words: Sequence[str], *, named: bool = True
+    ) -> Iterator[Occurrence]:
         """Yield the names of a line."""
-        owner = table.name.text
-        yield Occurrence(Space.LINE, row.name, row.cells[0].span, owner, True, row)
-        yield from (self.name(Space.LINE, name, None, owner) for name in (*row.above, *row.same))
+        yield from self.marked(row, owner, row.cells[0] if named else None)
         tests = zip(row.conditions, row.cells[1:], strict=False)
         for test, cell in tests:
             if test is not None:
                 yield from self.inside(cell, self.condition(test))
-        does = zip(row.actions, row.cells[1 + len(row.conditions) :], table.actions, strict=False)
-        for action, cell, heading in does:
-            if isinstance(action, tree.Comparison):
-                yield from self.inside(cell, self.expr(action.value))
-            else:
-                yield from self.inside(cell, self.body(action, orders=heading.word != "procedures"))
+        does = zip(row.actions, row.cells[1 + len(row.conditions) :], words, strict=False)
+        for action, cell, word in does:
+            yield from self.action(action, cell, word)
+
+    def action(
+        self, action: tuple[tree.Statement, ...] | tree.Comparison, cell: Cell, word: str
+    ) -> Iterator[Occurrence]:
+        """Yield the names of a cell of values, or of actions below a word."""
+        if isinstance(action, tree.Comparison):
+            yield from self.inside(cell, self.joined(action.value, list(action.places)))
+        else:
+            yield from self.inside(cell, self.body(action, orders=word != "procedures"))
 
     def inside(self, cell: Cell, found: Iterator[Occurrence]) -> Iterator[Occurrence]:
         """Yield names found in a cell, at their place in the file."""

@@ -15,7 +15,7 @@ from rcsc.lang.syntax import tree
 KEYWORDS = LOGIC | frozenset(
     """
     use unit const set enum type record input state output assume assumed monitored proved invariant property procedure module
-    extern owner table assuming link serves commands adopt level period preprocess postprocess by if else case for in local next
+    extern owner table assuming giving link serves commands adopt level period preprocess postprocess by if else case for in local next
     not mod was when then until upon true false bool int real single array of clamp reject deferred safe restart
     reads writes python c command rest status done failed executing order report stream reason within answered cycles without after
     again above same all line DEFAULT unreachable procedures command_out status_out req abs min max count

@@ -189,6 +189,8 @@ def with_column(text: str, name: str, at: int, heading: str, *, action: bool) ->
     def change(cells: Cells, *, top: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
         left, right = (tuple(cell.text for cell in each) for each in (cells.conditions, cells.actions))
         new = heading if top else ""
+        if action and table.once(cells):
+            return left, right
         return (left, insert(right, new, 0)) if action else (insert(left, new, 1), right)
 
     splices = list(_reshaped(table, part, change))
@@ -196,7 +198,10 @@ def with_column(text: str, name: str, at: int, heading: str, *, action: bool) ->
         (*before.headings[:at], heading, *before.headings[at:]),
         before.conditions + (not action),
         before.stubs,
-        tuple((*row[:at], "", *row[at:]) for row in before.cells),
+        tuple(
+            (*row, "") if action and once else (*row[:at], "", *row[at:])
+            for row, once in zip(before.cells, _once(table), strict=True)
+        ),
     )
     return _sure(text, name, spliced(text, splices), after)
 
@@ -220,6 +225,8 @@ def without_column(text: str, name: str, at: int) -> str:
 
         def change(cells: Cells, *, top: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:  # noqa: ARG001  # as for one that is new
             left, right = (tuple(cell.text for cell in each) for each in (cells.conditions, cells.actions))
+            if action and table.once(cells):
+                return left, right
             if action:
                 return left, (*right[:side], *right[side + 1 :])
             return (*left[: side + 1], *left[side + 2 :]), right
@@ -229,9 +236,18 @@ def without_column(text: str, name: str, at: int) -> str:
         (*before.headings[:at], *before.headings[at + 1 :]),
         before.conditions - (not action),
         before.stubs,
-        tuple((*row[:at], *row[at + 1 :]) for row in before.cells),
+        tuple(
+            row[:-1] if action and once else (*row[:at], *row[at + 1 :])
+            for row, once in zip(before.cells, _once(table), strict=True)
+        ),
     )
     return _sure(text, name, spliced(text, splices), after)
+
+
+def _once(table: WrittenTable) -> list[bool]:
+    """Return for each line whether what it does stands in one cell for all columns."""
+    first = max(table.parts, key=lambda part: len(part.lines))
+    return [table.once(joined_cells(rows)) for rows in first.lines]
 
 
 def fresh(sheet: Sheet, at: int) -> str:

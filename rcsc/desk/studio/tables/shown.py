@@ -3,7 +3,7 @@
 In: a document and what is known of it. Out: JSON. Columns count as pages count letters: units of UTF-16.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -68,6 +68,7 @@ def document(name: str, open_file: Document, known: TextFindings | None) -> Json
 def _table(grid: Grid) -> Json:
     return {
         "name": grid.name,
+        "first": grid.first,
         "line": grid.area.start.line,
         "standing": {"state": grid.standing.state.value, "why": grid.standing.why},
         "columns": [
@@ -83,6 +84,7 @@ def _row(row: GridRow) -> Json:
         "name": row.name,
         "stub": row.stub.text,
         "cells": [cell.text for cell in row.cells],
+        "lines": row.lines,
         "default": row.default,
         "share": None if row.share is None else _share(*row.share),
         "line": row.area.start.line,
@@ -162,13 +164,24 @@ def _witness(witness: Witness, program: Program | None, table: Grid | None) -> J
         return shown
     snapshot = _snapshot(program, witness)
     headings = [each.heading for each in table.columns if each.kind == "condition"]
+    begins = int(table.first != "line")  # the first column of conditions stands in that of names
+    asked = range(begins, begins + len(headings))
+    rows = dict(_rows(meant, snapshot))
     return shown | {
-        "columns": [_tried(partial(_value, meant, at, snapshot)) or "" for at in range(len(headings))],
+        "columns": [_tried(partial(_value, meant, at, snapshot)) or "" for at in asked],
         "regions": [
             next((each for each in witness.region if each.startswith(f"{one} ")), "") for one in headings
         ],
-        "rows": dict(_rows(meant, snapshot)),
+        "rows": {row.name: _of_row([rows[name] for name in row.lines]) for row in table.rows}
+        if meant.turned
+        else rows,
     }
+
+
+def _of_row(lines: Sequence[Json]) -> Json:
+    """Return what is said of a row of a turned table: that one of its lines matches, or that none does."""
+    holds_ = [line["holds"] for line in lines]
+    return {"holds": True if True in holds_ else None if None in holds_ else False, "failed": []}
 
 
 def _snapshot(program: Program, witness: Witness) -> Snapshot:

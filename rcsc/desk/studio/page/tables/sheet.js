@@ -5,6 +5,9 @@ import { spoken } from "../make.js";
 import { cellsOf, filling, textOf } from "./clip.js";
 import { breakable, kindOf } from "./desk.js";
 
+/** The lines that a row of the grid stands for: of a turned table one a cell. */
+const linesOf = (row) => JSON.parse(row.dataset.lines ?? "[]");
+
 export class SheetGrid {
   #desk; #bus; #root; #table; #cells = []; #shape = ""; #at = { line: 0, column: -1 }; #anchor = null; #editing = null; #shownWitness = null;
   #wanted = null;
@@ -42,7 +45,7 @@ export class SheetGrid {
       return;
     }
     if (this.#named !== `${this.#desk.file} ${shown.name}`) { this.#named = `${this.#desk.file} ${shown.name}`; this.#shownWitness = null; this.#at = { line: 0, column: -1 }; }
-    const shape = JSON.stringify([this.#named, shown.name, shown.columns.map(({ kind }) => kind), shown.rows.length]);
+    const shape = JSON.stringify([this.#named, shown.name, shown.columns.map(({ kind }) => kind), shown.rows.length, shown.first]);
     const held = this.#table.contains(document.activeElement);
     if (shape !== this.#shape) {
       if (this.#editing && !this.#wanted) this.#drop();
@@ -59,9 +62,9 @@ export class SheetGrid {
     this.#lit();
   }
 
-  #build({ columns, rows }) {
+  #build({ columns, rows, first }) {
     const head = make("tr", { role: "row", class: "head" });
-    head.append(make("th", { role: "columnheader", class: "stub corner", scope: "col", "data-line": "-1", "data-column": "-1", tabindex: "-1" }, "line"),
+    head.append(make("th", { role: "columnheader", class: "stub corner", scope: "col", "data-line": "-1", "data-column": "-1", tabindex: "-1" }, first),
       make("th", { role: "columnheader", class: "share", scope: "col", title: "Share of the inputs in the declared ranges that the line matches, be they assumed away or not" }, "share"),
       make("th", { role: "columnheader", class: "tells", scope: "col" }));
     this.#cells = [[head.cells[0]]];
@@ -101,9 +104,10 @@ export class SheetGrid {
       const share = line_.querySelector(".share");
       share.textContent = row.share?.text ?? "";
       share.title = row.share?.of ?? "";
-      const out = filter && filter.of.includes(row.name) && !filter.can.includes(row.name) && !filter.unknown.includes(row.name);
+      line_.dataset.lines = JSON.stringify(row.lines);
+      const out = filter && row.lines.some((name) => filter.of.includes(name)) && !row.lines.some((name) => filter.can.includes(name) || filter.unknown.includes(name));
       line_.hidden = Boolean(out);
-      line_.classList.toggle("unknown", Boolean(filter?.unknown.includes(row.name)));
+      line_.classList.toggle("unknown", Boolean(row.lines.some((name) => filter?.unknown.includes(name))));
     });
     this.#cells.flat().forEach((cell) => { cell.tabIndex = -1; });
     const here = this.#cell(this.#at);
@@ -133,7 +137,7 @@ export class SheetGrid {
     for (const old of this.#table.querySelectorAll("tr.finding")) old.remove();
     for (const cell of this.#table.querySelectorAll(".wrong-cell, .wrong-line, .region, .fails")) cell.classList.remove("wrong-cell", "wrong-line", "region", "fails");
     const found = this.#desk.findings();
-    const rows = new Map([...this.#table.tBodies[0].rows].map((row) => [row.dataset.name, row]));
+    const rows = new Map([...this.#table.tBodies[0].rows].flatMap((row) => [row.dataset.name, ...linesOf(row)].map((name) => [name, row])));
     const span = shown.columns.length + 3;
     for (const one of found) {
       const row = rows.get(one.line);
@@ -225,7 +229,7 @@ export class SheetGrid {
 
   #mark(name, scroll = false) {
     for (const row of this.#table.tBodies[0]?.rows ?? []) {
-      const is = Boolean(name) && row.dataset.name === name && this.#bus.selection.table === this.#desk.table;
+      const is = Boolean(name) && (row.dataset.name === name || linesOf(row).includes(name)) && this.#bus.selection.table === this.#desk.table;
       row.classList.toggle("selected", is);
       if (is && scroll && !this.#table.contains(document.activeElement)) row.scrollIntoView({ block: "nearest" });
     }
@@ -234,7 +238,7 @@ export class SheetGrid {
   #lit() {
     const lines = new Set(this.#desk.running.flatMap((level) => level.lines ?? []));
     for (const row of this.#table.tBodies[0]?.rows ?? []) {
-      const is = lines.has(row.dataset.name);
+      const is = linesOf(row).some((name) => lines.has(name));
       if (is && this.#desk.follows && !row.classList.contains("now")) row.scrollIntoView({ block: "nearest" });
       row.classList.toggle("now", is);
       const stub = row.querySelector("th.stub");
