@@ -34,6 +34,7 @@ FEATURES = {
     "`not in`": r"\bnot in\b",
     "`-` or a blank for what does not count, `DEFAULT` for all else": r"\| DEFAULT",
     "masks of a word": r"(?<!\w)(?:0b)?(?=[01x ]*x)[01x]{4}[ _][01x]{4}(?!\w)",
+    "a matrix, or a column for each result": r"^table \w+ (?:by .* )?giving ",
     "conditions over several variables, under `when`": r"\| when +\|",
     "`was`, `@T`, `@F`, `@C`": r"\bwas\b|@[TFC]\(",
     "time: `for`": r"\bfor \d",
