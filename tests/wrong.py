@@ -5,7 +5,7 @@ proposal out and has the whole `rcsc check` look at it. `tests/table/test_wrong.
 
 Each table has several mistakes: its cells are drawn about a few cuts a column, so that lines overlap, touch, leave gaps or never
 match; over truth values, small and large enumerations, whole numbers of up to 64 bits, doubles and singles, words and their bits, sums,
-elements of arrays, sets, assumptions, events, `above` and `same`.
+elements of arrays, sets, assumptions, events, of a heading, too, `above` and `same`; now and then one is printed the other way round.
 """
 
 import argparse
@@ -39,6 +39,7 @@ from rcsc.lang.model import Program, key_bounds, key_of, unspelled
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.written.changes import with_proposal
 from rcsc.proof.solvers.options import Options
+from tests.support.programs import turned
 
 MOST_CPU_S = 2.0
 """Of one command, on one table."""
@@ -282,7 +283,9 @@ def _drawn(rng: Rng, small: bool) -> str:
     tables = [_table("t", draw, named, rng, min(most, rng.choice(lines)))]
     # Not from `rng`, as above.
     own = random.Random(f"{tables}")
-    if own.randrange(2):
+    if not own.randrange(6):
+        tables[0] = _turned(draw, named, own)
+    elif own.randrange(2):
         greatest = own.choice((1, 2, 5, 40))
         draw.declared.append(f"state z : int 0 .. {greatest}")
         tables[0] = _with_state(tables[0], greatest, own)
@@ -301,6 +304,10 @@ def _table(name: str, draw: Draw, assumed: Sequence[str], rng: Rng, many: int) -
     names = [f"n{at}" for at in range(many)]
     for at, each in enumerate(names):
         cells = [head.cells(rng) if rng.randrange(3) else "" for head in heads]
+        # Not from `rng`, as above.
+        own = random.Random(f"{heads[0].text} {cells}")
+        if not own.randrange(6):
+            cells = [_event(head, cell, draw, own) for head, cell in zip(heads, cells, strict=True)]
         order = _order(names[:at], names[at + 1 :], rng)
         rows.append(
             f"  | {each}{order} | {' | '.join(cells)} || {rng.choice(('', '', 'q'))} | {rng.randrange(3)} |"
@@ -311,6 +318,30 @@ def _table(name: str, draw: Draw, assumed: Sequence[str], rng: Rng, many: int) -
         rows.append(f"  | rest | {default} |{blank}{'|' if blank else ''}| | 1 |")
     rests = f" assuming {', '.join(assumed)}" if assumed and rng.randrange(3) else ""
     return "\n".join([f"table {name}{rests} {{", *rows, "}"])
+
+
+def _event(head: Heading, cell: str, draw: Draw, rng: Rng) -> str:
+    """A cell that says that its heading came to be what the cell says, or ceased to be, or changed; or the cell itself."""
+    if head.text == "when" or "for 300" in cell or not rng.randrange(3):
+        return cell
+    word = rng.choice(("@T", "@F"))
+    changed = word if head.cells is truths else "@C"
+    event = rng.choice((f"{word}({cell})", changed)) if cell else changed
+    guards = [
+        each for each in draw.conditions if "@" not in each and "was " not in each and " for " not in each
+    ]
+    way = rng.randrange(4)
+    if way == 0:
+        return f"not {event}"
+    return f"{event} when {rng.choice(guards)}" if way == 1 and guards else event
+
+
+def _turned(draw: Draw, assumed: Sequence[str], rng: Rng) -> str:
+    """A table that is printed the other way round: a matrix, or one with a column for each result."""
+    columns = [(each.text, each.cells) for each in draw.headings]
+    one = turned.drawn(columns, draw.conditions, "o", ("0", "1", "2", "o"), rng, named=True)
+    rests = f" assuming {', '.join(assumed)}" if assumed and rng.randrange(2) else ""
+    return "\n".join([f"table t {one.said}{rests} {{", *one.turned, "}"])
 
 
 def _with_state(table: str, greatest: int, rng: Rng) -> str:

@@ -199,7 +199,9 @@ def test_findings_of_the_proof_stand_in_cells() -> None:
         "run",
         "idle",
     ]
-    assert shown(RESULTS.replace("level <= 3", "level < 2 and level > 5"), "RCS314") == ["level < 2 and level > 5"]
+    assert shown(RESULTS.replace("level <= 3", "level < 2 and level > 5"), "RCS314") == [
+        "level < 2 and level > 5"
+    ]
     assert shown(RESULTS.replace("| level |", "| level + 5 |"), "RCS401") == []
     known = RESULTS.replace("not done", "done for 2 [s]").replace("| rest    | DEFAULT || shown    |\n", "")
     assert [each.code.value for each in reported(known)] == ["RCS317"]

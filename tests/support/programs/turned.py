@@ -21,10 +21,13 @@ def drawn(
     giving: str,
     results: Sequence[str],
     rng: Random,
+    *,
+    named: bool = False,
 ) -> Both:
     """Draw a table over columns of conditions, each a heading and its cells, and conditions by themselves, with these results.
 
-    Where the cells are conditions, or columns have them by themselves, the lines have a column `when`.
+    Its rows have names, where they are `named`, else perhaps. Where the cells are conditions, or columns have them by themselves,
+    the lines have a column `when`.
     """
     left = rng.sample(columns, min(len(columns), rng.randint(1, 2)))
     matrix = not conditions or rng.randrange(2) == 0
@@ -32,7 +35,7 @@ def drawn(
     across = [_heading(by, conditions, results, rng) for _ in range(rng.randint(1, 4))]
     heads = [heading for heading, _ in left]
     own = [*heads, *([by[0]] if by else []), "when"]
-    named = rng.randrange(3) > 0
+    named = named or rng.randrange(3) > 0
     turned = [_row([*(["line"] if named else []), *heads], [f"c{at} : {text}" for at, (text, _) in enumerate(across)])]  # fmt: skip
     lines = [_row(["line", *own], [giving])]
     for number in range(rng.randint(1, 4)):
