@@ -24,5 +24,6 @@ a third of Lark's time and is held against Lark by tests. Reading takes time lin
 
 Modules, in the order the data flows: `screen` refuses what is no text of the language, `rows` cuts tables into parts, lines and cells,
 `parse` reads (with `lalr`) and says by `expected` what it expected, `build` makes the `tree`, `comments` puts
-comments to their nodes; `format` lays a tree out again, `layout` its tables, `spell` its expressions.
+comments to their nodes; `turned` makes lines of tables that are printed the other way round; `format` lays a tree out
+again, `layout` its tables, `spell` its expressions.
 """

@@ -164,7 +164,7 @@ def _others(
     name a line, or `all`. What is none of these stands with the first line alone, where it is reported.
     """
     row, across = marked
-    rows = row, [each.name for each in turned.rows], "{}_" + across.name
+    rows = row, [each.name for each in turned.rows if not each.default], "{}_" + across.name
     columns = across, [each.name for each in turned.across], row.name + "_{}"
     each: tree.Row | tree.Across
     for each, kind, form in (rows, columns):

@@ -15,5 +15,6 @@ A test that needs a program writes its text, or names one of `examples`, and tak
 `examples`: programs that several rooms use.
 `texts`: parts of a text (a table, a level, the description of a system), and edits that are sure to be made.
 `systems`: a system of two levels, with other texts in some of its files, and one of a single level.
+`turned`: a drawn table that is printed the other way round, and the same in ordinary lines.
 `arbitrary`: any program at all, as trees.
 """

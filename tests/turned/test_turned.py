@@ -165,6 +165,8 @@ def test_in_lines_it_is_the_same_table() -> None:
         (MATRIX, "in {stop}  ", "-          ", "RCS101", "-"),
         (MATRIX, "| DEFAULT     || now |", "| DEFAULT || now | run |", "RCS108", "run"),
         (MATRIX, "-              |     ", "-              |  |  ", "RCS102", "| in {stop}   || run | -              |  |                |"),
+        (RESULTS, "resting |", "resting above rest |", "RCS217", "rest"),
+        (RESULTS, "busy   ", "busy above busy", "RCS201", "busy"),
         (RESULTS, "level>3", "level>", "RCS101", ""),
         (RESULTS, "level>3", "levl>3", "RCS201", "levl"),
         (RESULTS, "not done", "1 + 1   ", "RCS301", "1 + 1"),

@@ -1,0 +1,1 @@
+"""Tables printed the other way round: language, layout, findings and grid."""
