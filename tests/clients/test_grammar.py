@@ -146,6 +146,7 @@ commands low : l within 3 cycles else late answered within 9 cycles
 adopt a after b
 level v { period 40 [ms] preprocess f table by a.b { x : t } postprocess g }
 table t assuming m { }
+table t by a.b giving c { }
 drive := goto(target := 3, again)
 x := abs(min(1, single(2)))
 """

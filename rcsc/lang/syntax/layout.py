@@ -157,7 +157,7 @@ def table_rows(table: tree.TableDecl, width: int) -> Iterator[tuple[tree.Row | N
         names = again = columns.pop(0).texts
     stub = max(map(len, names))
     once = {} if turned is None else {at: row for at, row in enumerate(rows, 1) if row.default}
-    for number, part in enumerate(_parts(columns, width - _INDENT, stub)):
+    for number, part in enumerate(_parts(columns, width - _INDENT, stub, whole=turned is not None)):
         if number:
             yield None, ""
         yield from _part(again if number else names, stub, part, () if number else rows, once)
@@ -226,22 +226,22 @@ def _length(columns: Sequence[_Column], stub: int) -> int:
     return _total([column.width for column in columns], stub)
 
 
-def _parts(columns: list[_Column], width: int, stub: int) -> list[list[_Column]]:
-    """Divide the columns into parts, and set their widths."""
+def _parts(columns: list[_Column], width: int, stub: int, *, whole: bool) -> list[list[_Column]]:
+    """Divide the columns into parts, and set their widths; conditions and actions together where the table is a `whole`, as a matrix is."""
     if _length(columns, stub) <= width:
         return [columns]
-    parted = _parted(columns, width, stub)
+    parted = list(_side(columns, width, stub)) if whole else _parted(columns, width, stub)
     natural = [column.width for column in columns]
     if _total([column.least for column in columns], stub) > width:
         for part in parted:
             _fit(part, width, stub)
         return parted
     _fit(columns, width, stub)
-    whole, narrow = _rows_of([columns]), [column.width for column in columns]
+    needed, narrow = _rows_of([columns]), [column.width for column in columns]
     _widen(columns, natural)
     for part in parted:
         _fit(part, width, stub)
-    if whole <= _rows_of(parted):
+    if needed <= _rows_of(parted):
         _widen(columns, narrow)
         return [columns]
     return parted

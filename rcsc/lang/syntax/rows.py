@@ -113,12 +113,13 @@ class Cell:
         return replace(self, text="") if self.text == "-" else self
 
     def part(self, start: int, end: int) -> "Cell":
-        """Return some characters of the first piece, as a cell.
+        """Return some characters, as a cell.
 
         >>> Cell("halted above ready", "a.rcs", 40).part(13, 18)
         Cell(text='ready', file='a.rcs', start=53, further=())
         """
-        return Cell(self.text[start:end], self.file, self.start + start)
+        further = tuple((offset - start, place) for offset, place in self.further if start < offset < end)
+        return Cell(self.text[start:end], self.file, self.at(start, end).start, further)
 
     def with_piece(self, piece: "Cell") -> "Cell":
         """Return the cell with one piece more; a blank between, but after `_` and `.`.

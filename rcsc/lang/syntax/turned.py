@@ -53,19 +53,12 @@ def heading_of(cell: Cell, *, of: bool) -> tuple[Cell | None, Cell, bool]:
     stub: Cell | None = None
     said = cell
     if named is not None and STUB.match(named["stub"]):
-        stub, said = _rest(cell, 0, named.end("stub")), _rest(cell, named.end())
+        stub, said = cell.part(0, named.end("stub")), cell.part(named.end(), len(cell.text))
     elif found.above or found.same:
         stub, said = cell, found.name
     if of and said.text.startswith("when "):
-        return stub, _rest(said, len(said.text) - len(said.text[5:].lstrip())), True
+        return stub, said.part(len(said.text) - len(said.text[5:].lstrip()), len(said.text)), True
     return stub, said, False
-
-
-def _rest(cell: Cell, start: int, end: int | None = None) -> Cell:
-    """Return a part of a cell, which may go on in rows below."""
-    end = len(cell.text) if end is None else end
-    further = tuple((offset - start, place) for offset, place in cell.further if start < offset < end)
-    return Cell(cell.text[start:end], cell.file, cell.at(start, end).start, further)
 
 
 def crossed(
