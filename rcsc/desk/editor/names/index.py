@@ -216,7 +216,8 @@ class _Walk:
             yield from self.inside(heading.cell, self.exprs((heading.subject,)))
         word = turned.giving.word
         for across in turned.across:
-            yield from self.marked(across, owner, across.place if across.given else None)
+            own = across.given and across.cell.start != across.place.start  # else its name is what it says
+            yield from self.marked(across, owner, across.place if own else None)
             if isinstance(across.said, tuple):
                 yield from self.action(across.said, across.cell, word)
             else:
