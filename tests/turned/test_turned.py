@@ -5,13 +5,13 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 
+from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.source import Source
 from rcsc.code.testing.inputs.sampling import declarations, snapshot
 from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.names.index import Space, occurrences
 from rcsc.desk.editor.places import Lines
 from rcsc.desk.editor.values import Standing, State
-from rcsc.desk.shell.reload.refusal import Refused
 from rcsc.desk.studio.tables import cells
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program
@@ -233,12 +233,11 @@ def test_the_grid_shows_and_edits_it_as_it_is_printed() -> None:
         ("in {stop}", "stop", ("stop_go",)),
         ("DEFAULT", "default", ("default",)),
     ]
-    place = cells.GridCell(1, 0)
-    changed = cells.with_cells(text, "t", [(place, "idle"), (cells.GridCell(3, 0), "idle")])
+    changed = cells.with_cells(text, "t", {(1, 0): "idle", (3, 0): "idle"})
     assert [str(line.name) for line in program_of(changed).tables[0].lines][:2] == ["idle_go", "run_go"]
     assert "  | DEFAULT   || idle " in changed
     with pytest.raises(Refused):
-        cells.with_cells(text, "t", [(cells.GridCell(3, 1), "idle")])
+        cells.with_cells(text, "t", {(3, 1): "idle"})
 
 
 @pytest.mark.parametrize("width", [110, 60])
