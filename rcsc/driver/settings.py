@@ -87,6 +87,8 @@ class TestEffort:
         mutants: How many mutants of each table (and of the C, where `deep`); 0 for none, -1 for all.
         vectors: Where to write vectors that cover the whole C.
         sessions: Where to write the sessions that were drawn for them.
+        plant: The plant in which systems alone are run, in as many episodes as there are examples; None for everything, and for the
+            plant that a campaign takes.
     """
 
     examples: int = 200
@@ -97,3 +99,4 @@ class TestEffort:
     mutants: int = 24
     vectors: Path | None = None
     sessions: Path | None = None
+    plant: str | None = None

@@ -3,15 +3,17 @@
 In: proved programs and their generated files. Out: what the suite found, and its figures as text.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host import children
+from rcsc.base.host.cache import open_cache
 from rcsc.base.host.files import write_atomically
 from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import write
@@ -24,6 +26,7 @@ from rcsc.code.testing.suite import Proofs, SuiteOptions, run_suite
 from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings, TestEffort
+from rcsc.driver.watched import claims_of
 from rcsc.lang.model import Expr, Program, ProvedProgram, Snapshot, Table
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.smt import Answer, Solver
@@ -31,18 +34,15 @@ from rcsc.proof.symbolic.encode import declared, encode
 from rcsc.proof.table.certificate import must_cover
 from rcsc.proof.table.decide import prove_table
 from rcsc.proof.table.verdict import Gap
-from rcsc.run.campaign.choose import plant_name, plant_of
+from rcsc.run.campaign.choose import kind_of, plant_name, plant_of
 from rcsc.run.campaign.counterexamples import folder_word
-from rcsc.run.campaign.shrink import MOST_TRIES, shrink
+from rcsc.run.campaign.rig import E, Rig
+from rcsc.run.campaign.search import Searched, search, smallest
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, description
-from rcsc.run.episodes.episode import Episode
-from rcsc.run.episodes.outcome import EpisodeFinding
-from rcsc.run.episodes.search import KINDS, Searched, found_again, search
-from rcsc.run.episodes.stand import Stand, stand
+from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.executors import NotBuilt
 from rcsc.run.link import Linked, drawing, run_beside, script
-from rcsc.run.system import Kind
 
 MOST_TICKS_EACH = 5
 """Ticks of a whole system for each example of a table."""
@@ -65,7 +65,8 @@ def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion
         return Conclusion(report, "nothing was tested: not everything is proved")
     diagnostics: list[Diagnostic] = []
     figures = []
-    for root, program in project.executable:
+    alone = effort.plant is not None
+    for root, program in () if alone else project.executable:
         found = code_of(root, partial(files_of, program, TARGETS), code, systems)
         given = (program.program, found.files, settings.options, effort)
         wrong, text = _tried(f"program `{program.program.name}`", found, _try_out, given, settings)
@@ -74,9 +75,14 @@ def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion
     for path in systems:
         found = code_of(str(path), partial(_files, path, project), code, (path,))
         generated = replace(_generated(path, project, found.defensive), files=dict(found.files))
-        for trial in (_beside, _in_plant):
+        claims = NOTHING
+        if alone:
+            plant_of(description(path), effort.plant)  # refused before anything is proved
+            claims = claims_of(path, open_cache(path.parent) if settings.use_cache else None)
+        again = "" if not found.stale else " --no-compile" if code.folder is None else None
+        for trial, more in ((_beside, ()), (_in_plant, (claims, again)))[alone:]:
             settings.progress(f"running {path}")
-            wrong, text = _tried(f"system `{path}`", found, trial, (path, generated, effort), settings)
+            wrong, text = _tried(f"system `{path}`", found, trial, (path, generated, effort, *more), settings)
             diagnostics += wrong
             figures += [text] if text not in figures else []
         figures.append(f"  tested: {found.words}")
@@ -151,21 +157,39 @@ def _files(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
     return _generated(path, project, defensive).files
 
 
-def _in_plant(path: Path, generated: Generated, effort: TestEffort, progress: Callable[[str], None]) -> Told:
-    """Run drawn episodes of a system in its plant; return the first that breaks a property, shrunk and saved, and a line on all runs."""
+def _in_plant(  # as many as there are facts
+    path: Path,
+    generated: Generated,
+    effort: TestEffort,
+    claims: Claims,
+    again: str | None,
+    progress: Callable[[str], None],
+) -> Told:
+    """Run drawn episodes of a system in its plant; return the first that breaks a property, shrunk and saved, and a line on all runs.
+
+    Args:
+        path: Of its description.
+        generated: The code that is tested.
+        effort: How many episodes, and in which plant.
+        claims: What was proved, to be watched.
+        again: The option with which `rcsc campaign` runs that code; None where it cannot.
+        progress: Told what is being done.
+    """
     if generated.clashes:
         return (), ""
     whole = generated.systems[path]
     extern = any(p.extern for program in whole.programs for p in program.plan.program.procedures)
-    kinds = KINDS[1:] if extern else KINDS
-    progress(f"running {whole.word} in episodes")
+    examples = max(1, effort.examples // EXAMPLES_EACH) if effort.plant is None else effort.examples
     with children.scratch("episodes") as folder:
         write(generated.files, str(folder))
         try:
-            its = stand(path.resolve(), folder)
-            spec = plant_of(its.system, None)
-            plant = plant_name(spec)
-            searched = search(its, max(1, effort.examples // EXAMPLES_EACH), plant, kinds)
+            described = description(path)
+            spec = plant_of(described, effort.plant)
+            rig = Rig(
+                kind_of(described, spec), path.resolve(), plant_name(spec), "python" if extern else "both",
+                claims=claims, generated=folder,
+            )  # fmt: skip
+            searched = search(rig, examples, lambda at: progress(f"running {whole.word}: episode {at}"))
         except ModuleNotFoundError as error:
             extra = "hypothesis" if error.name == "hypothesis" else "cell"
             return (
@@ -176,48 +200,63 @@ def _in_plant(path: Path, generated: Generated, effort: TestEffort, progress: Ca
             return (), f"system {whole.word}: no episodes: {error}"
         except NotBuilt as error:
             return (Diagnostic(Code.NO_C_COMPILER, str(error), Label(Span(str(path), 0, 0))),), ""
-        diagnostics = (
-            () if searched.falsified is None else (_falsified(path, its, searched.falsified, kinds),)
-        )
-    return diagnostics, _figure(whole.word, its, searched, kinds, spec)
+        figure = _figure(whole.word, rig, searched, spec)
+        if searched.falsified is None:
+            return (), figure
+        plant = f" --plant {rig.plant}" if rig.plant else ""
+        command = "" if again is None else f"rcsc campaign {path}{plant}{again} --again"
+        return (_falsified(path, rig, searched, command, progress),), figure
 
 
-def _figure(word: str, its: Stand, searched: Searched, kinds: Sequence[str], spec: PlantSpec | None) -> str:
+def _figure(word: str, rig: Rig[Any], searched: Searched[Any], spec: PlantSpec | None) -> str:
     """Describe a system's episodes: how many ran, and what was left out."""
     ran = sum(bool(line) for _, _, line in searched.lines)  # a cycle that an input ended ran none
+    its = rig.stand()
     lines = sum(
         len(its.signs[level.name].tables[table])
         for level in its.system.levels
         for table in its.signs[level.name].tables
     )
     where = "without a plant" if spec is None else f"in plant `{spec.name or spec.python}`"
-    same = "C and Python the same" if len(kinds) > 1 else "in Python alone: extern procedures have no C here"
+    python = "in Python alone: extern procedures have no C here"
+    same = python if rig.executor == "python" else "C and Python the same"
+    if searched.falsified is not None:
+        same = f"`{searched.falsified[1].property}` is broken in the last"
     excused = f", {searched.excused} with what a stale or forged value explains" if searched.excused else ""
+    claims = sum(len(level.claims) for level in rig.claims.levels)
+    proved = f", {claims} proved claims watched" if claims else ""
     return (
         f"system {word}: {searched.episodes} episodes {where}, {searched.cycles} cycles, {ran} of {lines} lines, "
-        f"{same}{excused}"
+        f"{same}{excused}{proved}"
     )
 
 
 def _falsified(
-    path: Path, its: Stand, falsified: tuple[Episode, EpisodeFinding], kinds: Sequence[Kind]
+    path: Path, rig: Rig[E], searched: Searched[E], command: str, progress: Callable[[str], None]
 ) -> Diagnostic:
-    """Shrink an episode, save it, and report the property that it breaks."""
-    episode, finding = falsified
-    name = finding.property
-    least = shrink(episode, lambda simpler: found_again(simpler, its, name, kinds) is not None, MOST_TRIES)
-    shown = found_again(least, its, name, kinds) or finding
-    folder = SAVED / f"test-{folder_word(name)}"
-    help_ = f"`rcsc campaign {path} --again {folder}` runs it again"
+    """Shrink the episode that was found, save it, and report the property that it breaks."""
+    assert searched.falsified is not None
+    least, shown = smallest(
+        rig, *searched.falsified, lambda at: progress(f"making the episode smaller: try {at}")
+    )
+    folder = SAVED / f"test-{folder_word(shown.property)}"
+    help_ = (
+        f"`{command} {folder}` runs it again"
+        if command
+        else f"it is kept in `{folder}`; this command finds it again"
+    )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_atomically(folder / "episode.json", least.to_json().encode())
         write_atomically(folder / "script.csv", least.script().encode())
     except OSError as error:
         help_ = f"`{folder}` cannot be written: {error.strerror}"
-    message = f"in an episode of `{its.system.name}`, cycle {shown.tick}: `{shown.property}` does not hold: {shown.message}"
+    name = rig.stand().system.name
+    message = (
+        f"in an episode of `{name}`, cycle {shown.tick}: `{shown.property}` does not hold: {shown.message}"
+    )
     return Diagnostic(
-        Code.PROPERTY_BROKEN, message, Label(Span(str(path), 0, 0)), notes=least.told(), help=(help_,)
+        Code.PROPERTY_BROKEN, message, Label(Span(str(path), 0, 0)), notes=rig.kind.told(least), help=(help_,)
     )
 
 

@@ -1,8 +1,8 @@
 """Generated executors behind one interface: Python modules, and C built into one shared library.
 
 In: the generated folder and signatures. Out: executors that hold one state each. Values go in and out as tuples in declared
-order; both kinds give the same values, bit for bit. Those that were made by force of tables that do not prove, to run a finding, bear a
-mark (`host.files.write.UNPROVED`), and are refused.
+order; both kinds give the same values, bit for bit: `Twins` runs both on the same inputs and keeps where they do not. Those that were
+made by force of tables that do not prove, to run a finding, bear a mark (`host.files.write.UNPROVED`), and are refused.
 """
 
 import ctypes
@@ -262,6 +262,67 @@ class CExecutor:
                 [(place, self._formats[at]) for place, at in zip(places, run, strict=True)], end
             )
         part.pack_into(self._memory, base, *values)
+
+
+class Twins:
+    """The C and the Python executor of a level, given the same: what the C does counts, and the Python is held against it.
+
+    Attributes:
+        difference: The first, in words; empty for none.
+    """
+
+    def __init__(self, sign: Signature, c: CExecutor, python: PythonExecutor) -> None:
+        self._sign, self._c, self._python = sign, c, python
+        self.difference = ""
+        self._compare()
+
+    def cycle(self) -> int:
+        """Run one cycle of both; return the fault of the C, 0 for none."""
+        fault = self._c.cycle()
+        if not self.difference:
+            try:
+                self._python.cycle()
+            except USERS_FAILURES as error:  # no generated Python raises; one that was edited may
+                self.difference = f"the Python executor raises {raised(error)}"
+            else:
+                self._compare()
+        return fault
+
+    def check(self) -> int:
+        """Return what the C says of the state."""
+        c, python = self._c.check(), self._python.check()
+        if c != python and not self.difference:
+            self.difference = f"of a state, `check` says {c} in C and {python} in Python"
+        return c
+
+    def values(self) -> Values:
+        """Return all leaves, then the trace, of the C."""
+        return self._c.values()
+
+    def put(self, first: int, values: Sequence[Value]) -> None:
+        """Set the leaves of both from position `first` on."""
+        self._c.put(first, values)
+        self._python.put(first, values)
+
+    def _compare(self) -> None:
+        c, python = self._c.values(), self._python.values()
+        if self._bytes(c) == self._bytes(python):
+            return
+        leaves = self._sign.leaves
+        for at, (a, b) in enumerate(zip(c, python, strict=True)):
+            if repr(a) != repr(b):
+                leaf = leaves[at] if at < len(leaves) else None
+                name, words = (
+                    (self._sign.trace[at - len(leaves)], repr) if leaf is None else (leaf.name, leaf.shown)
+                )
+                self.difference = f"`{name}` is {words(a)} in C and {words(b)} in Python"
+                return
+
+    def _bytes(self, values: Values) -> bytes | None:
+        try:
+            return self._sign.packed.pack(*values)
+        except struct.error:  # what edited Python may give
+            return None
 
 
 def _padded(fields: Sequence[tuple[int, str]], size: int) -> struct.Struct:

@@ -12,12 +12,13 @@ from rcsc.base.host.described import Document, KeyPath, nearest
 from rcsc.run.adopt import Restarted, restart
 from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.description import BadDescription, Description
-from rcsc.run.executors import CExecutor, Executor, PythonExecutor, build, refuse_unproved
+from rcsc.run.executors import CExecutor, Executor, PythonExecutor, Twins, build, refuse_unproved
 from rcsc.run.levels import Query, RunningLevel, misfit, running_level
 from rcsc.run.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
 from rcsc.run.signature import Signature, Values, generated_files, signature
 
-Kind = Literal["c", "python"]
+Kind = Literal["c", "python", "both"]
+"""Of executors: `both` runs the C, and holds the Python against it in every cycle."""
 
 
 class Outside(Protocol):
@@ -259,10 +260,18 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
         NotBuilt: The C could not be built.
     """
     levels = {name: sign.level_of(name) for name, sign in signs.items()}
+    python = {
+        name: PythonExecutor(system.generated, sign, levels[name])
+        for name, sign in signs.items()
+        if kind != "c"
+    }
     if kind == "python":
-        return {name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()}
+        return dict(python)
     library = build(system.generated, list({sign.program: sign for sign in signs.values()}.values()))
-    return {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
+    c = {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
+    return (
+        dict(c) if kind == "c" else {name: Twins(sign, c[name], python[name]) for name, sign in signs.items()}
+    )
 
 
 def assemble(

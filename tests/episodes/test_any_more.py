@@ -1,5 +1,6 @@
 """Episodes of systems of other kinds: feeds, extern procedures, no protocol, a model, and the paper's cell by its declarations alone."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -121,6 +122,32 @@ class TestRcscTest:
         assert "system room: not run as a whole: its levels ask a database" in said
         assert "system room: 3 episodes in plant `room.py`, " in said
         assert "2 of 2 lines, C and Python the same" in said
+
+    def test_runs_a_plant_alone_with_what_was_proved(
+        self, room: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert rcsc(["test", "--plant", "room.py", "--examples", "2", str(room)]) == 0
+        said = capsys.readouterr().out
+        assert "system room: 2 episodes in plant `room.py`, " in said
+        assert re.search(r"C and Python the same, \d+ proved claims watched", said)
+        assert "matches" not in said
+        assert rcsc(["test", "--plant", "cellar", str(room)]) == 1
+        assert "the description has no plant `cellar`" in capsys.readouterr().err
+        assert rcsc(["test", "--plant", "room.py", str(room / "lamp.rcs")]) == 2
+
+    def test_shows_where_c_that_was_edited_differs_and_how_to_run_that_again(
+        self, room: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert rcsc(["compile", "-q", str(room)]) == 0
+        edit_file(room / "generated/c/lamp.c", ("s->on = true;", "s->on = false;"))
+        capsys.readouterr()
+        assert rcsc(["test", "--plant", "room.py", "--examples", "2", str(room)]) == 1
+        said = "".join(capsys.readouterr())
+        assert "`C and Python do the same` does not hold: level `lamp`, table `" in said
+        assert "`on` is false in C and true in Python" in said
+        folder = "campaign/test-c-and-python-do-the-same"
+        assert f"--plant room.py --no-compile --again {folder}` runs it again" in said.replace(f"{room}/", "")
+        assert rcsc(["campaign", str(room), "--no-compile", "--again", folder]) == 1
 
     def test_says_what_it_leaves_out(
         self, room: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 
 from rcsc.compose.contract.obligations import Sort
 from rcsc.front.commands import run as rcsc
-from rcsc.run.campaign.shrink import shrink
+from rcsc.run.campaign.choose import ANY
+from rcsc.run.campaign.rig import Rig
+from rcsc.run.campaign.search import REPEATS, episodes, found_again, search, smallest
 from rcsc.run.episodes.cycle import Broken
 from rcsc.run.episodes.episode import (
     BufferFault,
@@ -24,7 +26,6 @@ from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.loop import Loop, check, run
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome
 from rcsc.run.episodes.sampling import draw, fault_classes, fault_names
-from rcsc.run.episodes.search import episodes, found_again, search
 from rcsc.run.episodes.stand import stand
 from rcsc.run.orders.script import BadScript
 from rcsc.run.signature import Value
@@ -37,6 +38,11 @@ DOCK, UNDOCK = OrderSpec("supervisor", "dock"), OrderSpec("supervisor", "undock"
 def robot(dock_compiled: Path) -> Path:
     """The description of the docking robot; only to be read."""
     return dock_compiled / "system.toml"
+
+
+def both(path: Path) -> Rig[Episode]:
+    """The robot, with C and Python side by side."""
+    return Rig(ANY, path, "", "both")
 
 
 def names(outcome: EpisodeOutcome) -> set[str]:
@@ -492,10 +498,10 @@ class TestExecutorsThatAreSpoilt:
 
 class TestTheSearch:
     def test_says_what_it_tried(self, robot: Path) -> None:
-        searched = search(stand(robot), 3)
+        searched = search(both(robot), 3)
         assert searched.falsified is None
         assert searched.episodes == 3
-        assert searched == search(stand(robot), 3)
+        assert searched == search(both(robot), 3)
 
     def test_finds_a_plant_that_does_not_repeat_itself(self, dock: Path) -> None:
         text = "import random\nfrom typing import Annotated"
@@ -505,18 +511,35 @@ class TestTheSearch:
             ("from typing import Annotated", text),
             ("self.lateral *= 0.9", "self.lateral *= random.random()"),
         )
-        searched = search(stand(path), 20)
+        searched = search(both(path), 20)
         assert searched.falsified is not None
-        assert searched.falsified[1].property == "the plant does the same again"
+        assert searched.falsified[1].property == REPEATS
+        assert searched.falsified[1].message.endswith(" in the same episode again")
 
     def test_finds_executors_that_differ(self, dock: Path) -> None:
         python = dock / "generated/python/drive.py"
         python.write_text(python.read_text().replace("s.speed_mm_s = 400", "s.speed_mm_s = 401"))
-        searched = search(stand(dock / "system.toml"), 20)
+        searched = search(both(dock / "system.toml"), 20)
         assert searched.falsified is not None
-        finding = searched.falsified[1]
+        episode, finding = searched.falsified
         assert finding.property == "C and Python do the same"
-        assert finding.message == "`drive.speed_mm_s` is 400 with c and 401 with python"
+        assert (
+            finding.message
+            == "level `drive`, table `goto`, line `start`: `speed_mm_s` is 400 in C and 401 in Python"
+        )
+        assert run(episode, dock / "system.toml").end == "executors differ"
+        assert not run(replace(episode, executor="c"), dock / "system.toml").findings
+
+    def test_python_that_raises_or_gives_what_is_no_such_value_differs(self, dock: Path) -> None:
+        python = dock / "generated/python/drive.py"
+        text = python.read_text()
+        for becomes, word in (
+            ("s.speed_mm_s = 1 // 0", "the Python executor raises ZeroDivisionError"),
+            ("s.speed_mm_s = 1 << 40", f"`speed_mm_s` is 400 in C and {1 << 40} in Python"),
+        ):
+            python.write_text(text.replace("s.speed_mm_s = 400", becomes))
+            [finding] = run(Episode(executor="both", orders=(UNDOCK,)), dock / "system.toml").findings
+            assert word in finding.message
 
     def test_is_a_strategy_for_tests_of_one_s_own(self, robot: Path) -> None:
         @settings(max_examples=5)
@@ -527,13 +550,12 @@ class TestTheSearch:
         holds()
 
     def test_leaves_of_what_is_found_one_order_and_one_restart(self, dock: Path) -> None:
-        its = stand(changed(dock, "drive.rcs", (" restart bad", "")))
-        searched = search(its, 60, kinds=("c",))
+        rig = Rig(ANY, changed(dock, "drive.rcs", (" restart bad", "")))
+        searched = search(rig, 60)
         assert searched.falsified is not None
-        episode, finding = searched.falsified
-        assert finding.property == "drive: failed stays failed"
-        least = shrink(episode, lambda simpler: found_again(simpler, its, finding.property) is not None)
+        assert searched.falsified[1].property == "drive: failed stays failed"
+        least, finding = smallest(rig, *searched.falsified)
         assert (len(least.orders), len(least.restarts), fault_classes(least)) == (1, 1, ("restarted",))
         assert least.told()[1] == f"before tick {least.restarts[0].tick}: level `drive` starts anew"
-        assert found_again(replace(least, restarts=()), its, finding.property) is None
-        assert found_again(replace(least, switches=(Switch("none", 0, 0),)), its, finding.property) is None
+        assert found_again(rig, replace(least, restarts=()), finding.property) is None
+        assert found_again(rig, replace(least, switches=(Switch("none", 0, 0),)), finding.property) is None

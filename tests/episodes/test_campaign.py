@@ -62,7 +62,7 @@ def playing(rig: Rig[Episode], **functions: Any) -> Rig[Episode]:
     return replace(rig, kind=replace(rig.kind, **functions))
 
 
-CALM = playing(PLAIN, draw=fake.calm, run=fake.play)
+CALM = playing(PLAIN, draw=fake.calm, loop=fake.Play)
 
 
 @contextmanager
@@ -224,7 +224,7 @@ def test_the_deaths_that_one_executor_reports_cost_no_other(tmp_path: Path) -> N
 
 
 def test_what_was_under_way_beside_a_killer_is_not_blamed(tmp_path: Path) -> None:
-    rig = playing(CALM, draw=fake.wild, run=fake.dawdle)
+    rig = playing(CALM, draw=fake.wild, loop=fake.Dawdle)
     killer = next(at for at in range(200) if fake.KILLS in _faults(rig, at))
     beside = [killer - 2, killer - 1, killer + 1, killer + 2]
     assert not any(fake.KILLS in _faults(rig, at) for at in beside)
@@ -381,7 +381,7 @@ with processes(2) as crew:
 
 
 def slow() -> Rig[Episode]:
-    return playing(CALM, run=fake.dawdle)
+    return playing(CALM, loop=fake.Dawdle)
 
 
 def _until(holds: Any, most_s: float = 900) -> None:
@@ -585,7 +585,7 @@ def test_one_counterexample_for_each_property_and_set_of_faults() -> None:
 
 
 def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path: Path) -> None:
-    rig = playing(PLAIN, run=fake.dislike)
+    rig = playing(PLAIN, loop=fake.Dislike)
     records = next(found for at in range(40) if (found := play(rig, digest(PLAIN), 2, [at]))[0].findings)
     with threads(1) as pool:
         [(choice, made)] = counterexamples(rig, 2, choices(records)[:1], pool)

@@ -77,17 +77,20 @@ def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_n
     assert rcsc(*played) == 1
     said = capsys.readouterr()
     assert "8 episodes, " in said.out
-    place, other = sorted(Path("campaign").iterdir())
+    place, *others = sorted(Path("campaign").iterdir(), key=lambda at: f" {at}/log.mcap" not in said.err)
     assert sorted(path.name for path in place.iterdir()) == [
         "episode.json", "finding.json", "log.mcap", "script.csv",
     ]  # fmt: skip
-    assert (place / "episode.json").read_bytes() == (other / "episode.json").read_bytes()
+    assert others
+    assert {(at / "episode.json").read_bytes() for at in (place, *others)} == {
+        (place / "episode.json").read_bytes()
+    }
     seen = f"rcsc campaign dock --again {place}"
-    assert said.err.splitlines()[-3:] == [
-        f"  = help: rcsc replay --system dock {place}/log.mcap",
-        f"  = help: {seen}",
-        f"episode {other.name.split('-')[1]} comes to the same: {seen}",
-    ]
+    *_, replays, plays = said.err.splitlines()[: -len(others)]
+    assert (replays, plays) == (f"  = help: rcsc replay --system dock {place}/log.mcap", f"  = help: {seen}")
+    assert set(said.err.splitlines()[-len(others) :]) == {
+        f"episode {other.name.split('-')[1]} comes to the same: {seen}" for other in others
+    }
     facts = json.loads((place / "finding.json").read_text())
     assert facts["property"] == "plant: stays_in_the_hall"
     assert "base.travelled = 1.0" in facts["said"]
@@ -112,7 +115,8 @@ def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_n
     assert all(line.startswith("note: the executors in ") for line in notes)
     assert f"saved before: {place}: {seen}\n" in said.out
     summed = json.loads(Path("s.json").read_text())
-    assert (summed["played_now"], summed["episodes"], summed["episodes_with_findings"]) == (0, 8, 2)
+    assert (summed["played_now"], summed["episodes"]) == (0, 8)
+    assert len(others) < summed["episodes_with_findings"] < 8
     assert {line["level"] for line in summed["lines"]} == {"supervisor", "drive"}
 
 
@@ -220,8 +224,8 @@ from rcsc.run.campaign.choose import ANY
 NONE = 3
 
 
-def calm(seed, system, plant, script):
-    return dataclasses.replace(ANY.draw(seed, system, plant, script), switches=(), harms=(), readings=())
+def calm(random, rig):
+    return dataclasses.replace(ANY.draw(random, rig), switches=(), harms=(), readings=())
 
 
 CALM = dataclasses.replace(ANY, draw=calm, takes_script=False)

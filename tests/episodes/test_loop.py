@@ -1,8 +1,7 @@
-"""The cell in the loop under Hypothesis: whatever is commanded and whatever goes wrong, the properties hold.
+"""The cell in the loop under Hypothesis: whatever is commanded and whatever goes wrong, the properties hold, and C and Python do the same.
 
-`HYPOTHESIS_PROFILE=long pytest tests/episodes/test_loop.py` looks for new episodes and for longer. What does not hold is kept in
-`.rcsc-cache/loop` as an episode, a script and a log; `rcsc_cell.episodes.episode.run` gives the same again. The episode goes to
-`tests/regress`, and is run for ever.
+`rcsc test tables/system.toml --plant mujoco --examples 500` looks for longer, and keeps what does not hold. Such an episode goes to
+`tests/regress`, and is run for ever. `python -m tests.episodes.broken` breaks the executors on purpose.
 """
 
 import os
@@ -14,16 +13,19 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import find, given, settings
 from hypothesis import strategies as st
 
 from rcsc.run.adopt import Begun
+from rcsc.run.campaign.rig import Rig
+from rcsc.run.campaign.search import episodes, search, smallest
 from rcsc.run.description import description
 from rcsc.run.episodes.episode import BufferFault, Harm, Restart
 from rcsc.run.episodes.harm import HarmedMemory
+from rcsc.run.episodes.properties import AGREE
 from rcsc.run.log.read import read
 from rcsc.run.log.replay import Replay
-from rcsc.run.system import signatures
+from rcsc.run.system import Kind, signatures
 from rcsc_cell.database.build import BadData
 from rcsc_cell.episodes.episode import (
     FAULTS,
@@ -35,35 +37,49 @@ from rcsc_cell.episodes.episode import (
     SwitchTo,
     script,
 )
-from rcsc_cell.episodes.kind import fault_classes
+from rcsc_cell.episodes.kind import CELL, fault_classes
 from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.episodes.sampling import draw
-from tests.support.loops import ACQUIRE, keep
+from tests.episodes.broken import BROKEN, MOST, broken_rig
+from tests.support.loops import ACQUIRE
 
 HERE = Path(__file__).parents[1]
-LONG = settings.get_current_profile_name() == "long"
 CASES = sorted((HERE / "regress").glob("*.json"))
 
 # --- the properties hold ---
 
 
-SEEDS = st.integers(0, 2**63 - 1)
+@pytest.mark.parametrize(("plant", "examples"), [("kinematic", 12), ("mujoco", 3)])
+def test_whatever_goes_wrong_the_properties_hold_in_c_and_in_python(plant: str, examples: int) -> None:
+    searched = search(Rig(CELL, SYSTEM, plant, "both"), examples)
+    assert searched.falsified is None, f"{searched.falsified[1]}\n{searched.falsified[0].to_json()}"
+    assert searched.episodes == examples
 
 
-@settings(max_examples=2000 if LONG else 20)
-@given(SEEDS)
-def test_whatever_goes_wrong_the_properties_hold(seed: int) -> None:
-    episode = draw(seed)
-    outcome = run(episode)
-    assert not outcome.findings, keep(episode, outcome)
+@pytest.mark.parametrize("where", ["c", "python"])
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_executor_is_found_with_physics(name: str, where: Kind, tmp_path: Path) -> None:
+    searched = search(broken_rig(name, {where}, "mujoco", tmp_path), MOST)
+    assert searched.falsified is not None
+    assert searched.falsified[1].property == AGREE
+    assert BROKEN[name].level in searched.falsified[1].message
 
 
-@settings(max_examples=200 if LONG else 3)
-@given(SEEDS)
-def test_they_hold_with_physics(seed: int) -> None:
-    episode = replace(draw(seed, "mujoco"), step_s=0.004)
-    outcome = run(episode)
-    assert not outcome.findings, keep(episode, outcome)
+def test_what_finds_a_broken_executor_shrinks_to_what_a_person_reads(tmp_path: Path) -> None:
+    """A force of 2 N: one part, and the rows that take it; nothing goes wrong in it."""
+    rig = broken_rig("a force of 2 N", {"c"}, "kinematic", tmp_path)
+    searched = search(rig, MOST)
+    assert searched.falsified is not None
+    least, finding = smallest(rig, *searched.falsified)
+    assert finding.message.endswith(" in Python")
+    assert "`to_hand.force_n` is 2.0 in C and " in finding.message
+    assert not fault_classes(replace(least, parts=searched.falsified[0].parts))
+    assert (len(least.rows), least.parts, least.seed) == (1, (), 0)
+    assert least.told() == (
+        "the cell moves by kinematics alone; seed 0",
+        f"row 1: `{' '.join(least.rows[0].split(',')).strip()}`",
+    )
+    assert rig.kind.read(least.to_json()) == least
 
 
 @pytest.mark.parametrize("path", CASES, ids=[path.stem for path in CASES])
@@ -152,10 +168,40 @@ def test_the_log_of_an_episode_replays_exactly_whatever_is_restarted(
 
 
 @settings(max_examples=50)
-@given(SEEDS)
-def test_an_episode_travels_as_json(seed: int) -> None:
-    episode = draw(seed)
+@given(episodes(SYSTEM, "mujoco"))
+def test_an_episode_travels_as_json_and_is_told(episode: Episode) -> None:
     assert Episode.from_json(episode.to_json()) == episode
+    assert episode.backend == "mujoco"
+    assert len(episode.told()) == 1 + sum(len(getattr(episode, name)) for name in episode.LISTS)
+
+
+def test_hypothesis_shrinks_what_it_draws_to_what_is_nominal_but_for_one_thing() -> None:
+    least = find(episodes(SYSTEM, "mujoco"), lambda one: any(fault.fault == "slips" for fault in one.faults))
+    [fault] = least.faults
+    assert len(least.rows) == 1
+    assert replace(least, rows=()) == Episode("mujoco", parts=(PartSpec("tbox"),), faults=(fault,))
+
+
+def test_an_episode_is_told_with_all_that_is_odd_about_it() -> None:
+    part = PartSpec("tbox", "buffer", 20.0, -30.5, 10.0, (80.0, 60.0, 41.0), friction=0.9)
+    episode = replace(
+        ODD,
+        parts=(part,),
+        faults=(SwitchTo("slips", 7, 7), SwitchTo("shifted_mm", 8, 9, -5.0)),
+        pushes=(Push(3, 0, 5.0, 0.0),),
+    )
+    assert episode.told() == (
+        "the cell moves by kinematics alone; seed 0",
+        "part 0: `tbox` lies on `buffer` at x = 20 mm, y = -30.5 mm, turned by 10 degrees, 80 x 60 x 41 mm large, with friction 0.9",
+        "row 1: `ACQUIRE BOXT (2) BUFFER`",
+        "ticks 20 .. 60: buffer `primitive.to_emove` is late",
+        "before tick 40: level `vision` starts anew",
+        "tick 7: the cell's fault `slips`",
+        "ticks 8 .. 9: the cell's fault `shifted_mm` = -5",
+        "tick 30: `task` is ordered `MOVE FIX-SAFE`, whatever is under way",
+        "tick 80: `task` is ordered `ACQUIRE BOXT (2) BUFFER`, whatever is under way",
+        "before tick 3: part 0 is pushed by x = 5 mm, y = 0 mm",
+    )
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,6 @@ system are those of `rcsc.run.episodes`; a plant may have its own, as that of th
 Trusted: nothing for a proof. What it costs: the episodes; shrinking one tries a bounded number of others.
 
 Modules, in the order the data flows: `rig` (what is played on), `choose` (which kind of episodes), `journal`, `shrink`,
-`work` (what a worker does), `worker_pool` (who plays), `runner` (gives out episodes and keeps what comes back),
-`counterexamples`, `summary`.
+`work` (what a worker does), `search` (for what breaks a property, by Hypothesis), `worker_pool` (who plays), `runner` (gives out
+episodes and keeps what comes back), `counterexamples`, `summary`.
 """

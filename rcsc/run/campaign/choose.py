@@ -9,15 +9,16 @@ import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any
 
 from rcsc.base.host.files.names import shown
-from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, usual_chunk
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, Rig, programs, run_sources, usual_chunk
 from rcsc.run.declared_plant import PlantSpec
 from rcsc.run.description import BadDescription, Description, description
 from rcsc.run.episodes.episode import Episode
-from rcsc.run.episodes.loop import check, run
-from rcsc.run.episodes.sampling import draw, fault_classes, fault_names
+from rcsc.run.episodes.loop import Loop, check
+from rcsc.run.episodes.sampling import drawn, fault_classes, fault_names
 from rcsc.run.executors import NotBuilt
 from rcsc.run.orders.script import BadScript, script_path
 from rcsc.run.plant.bind import BadPlant, plant_page
@@ -28,6 +29,16 @@ _MODEL_FILES = frozenset(
 )
 """What a model may be made of, beside its own file and below it."""
 _PHYSICS_CHUNK = 4
+
+
+def _drawn(random: Random, rig: Rig[Episode]) -> Episode:
+    """Return an episode of what `random` says."""
+    return drawn(random, rig.stand(), rig.plant, rig.script)
+
+
+def _begun(episode: Episode, rig: Rig[Episode]) -> Loop:
+    """Begin an episode."""
+    return Loop(episode, rig.stand(), rig.claims)
 
 
 def _files(system: Path, plant: str, script: str) -> list[NamedFile]:
@@ -99,7 +110,7 @@ def _chunk(system: Path, plant: str) -> int:
 
 
 ANY = EpisodeKind(
-    draw, run, Episode.from_json, _admit, fault_classes, fault_names, _files,
+    _drawn, _begun, Episode.from_json, _admit, fault_classes, fault_names, _files,
     not_in_order=(BadDescription, BadPlant, BadScript, NotBuilt, ModuleNotFoundError), chunk=_chunk, told=Episode.told,
 )  # fmt: skip
 

@@ -8,16 +8,22 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
+from random import Random
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeAlias, TypeVar
 
 from rcsc.base.host.files.read import MOST_OF_OURS, content
 from rcsc.lang.project import load
 from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.episodes.episode import by_seed
 from rcsc.run.episodes.outcome import EpisodeOutcome
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.executors import NotBuilt
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.system import Kind, signatures
+
+if TYPE_CHECKING:
+    from rcsc.run.episodes.loop import Loop
+    from rcsc.run.episodes.stand import Stand
 
 LineName: TypeAlias = tuple[str, str, str]
 """Level, table, line."""
@@ -28,7 +34,7 @@ _ROOMS = ("run", "lang", "code/testing/executors")
 
 
 class EpisodeValue(Protocol):
-    """An episode of any kind: a frozen dataclass of plain values and tuples, with a field `executor`.
+    """An episode of any kind: a frozen dataclass of plain values and tuples, with fields `executor` and `seed`.
 
     Attributes:
         LISTS: Fields that hold any number of things, those first that a smaller episode can best do without.
@@ -65,15 +71,16 @@ class EpisodeKind(Generic[E]):
     """Episodes of one kind. It travels to workers, so its functions stand in modules; a system is the path of its description.
 
     Attributes:
-        draw: Makes the episode of a seed, for a system, a plant and a script by their names; empty for its own.
-        run: Runs an episode of a system, with what was proved of it watched; the third is where the log goes.
+        draw: Makes an episode of what `Random` says, for a rig. The simplest answers (the first choice, the lowest number, no chance
+            taken) make the simplest episode: Hypothesis draws, too.
+        loop: Begins an episode on a rig, with what was proved watched.
         read: Makes an episode of its text; raises ValueError in words where it is none.
         admit: Gives a saved episode, which may come from anybody, as it is to run on a system and a plant; raises ValueError where it
             names what they have not.
         fault_classes: Which fault classes an episode of a system has; empty where it is nominal.
         faults: Every fault class of a system and plant, in the order in which they are shown.
         files: What outcomes depend on beside the description and the executors.
-        not_in_order: What `draw` and `run` raise when the system is not in order, which is no episode's doing.
+        not_in_order: What `draw` and `loop` raise when the system is not in order, which is no episode's doing.
         chunk: Episodes a task at most, for a system and plant: about a second of work, which handing over does not slow, and
             which is all that a kill loses.
         extra: The extra of the package that it needs.
@@ -81,8 +88,8 @@ class EpisodeKind(Generic[E]):
         told: What happens in an episode, in words, a line each.
     """
 
-    draw: Callable[[int, Path, str, str], E]
-    run: Callable[[E, Path, Path | None, Claims], EpisodeOutcome]
+    draw: Callable[[Random, "Rig[E]"], E]
+    loop: Callable[[E, "Rig[E]"], "Loop"]
     read: Callable[[str], E]
     admit: Callable[[E, Path, str], E]
     fault_classes: Callable[[E, Path], tuple[str, ...]]
@@ -105,6 +112,7 @@ class Rig(Generic[E]):
         script: What is ordered; empty where nobody says.
         limit_s: Seconds of the clock after which an episode hangs; generous, so that a busy machine changes nothing.
         claims: What was proved of the system, to be watched.
+        generated: Where its executors are; None for where it says itself.
     """
 
     kind: EpisodeKind[E]
@@ -114,15 +122,30 @@ class Rig(Generic[E]):
     script: str = ""
     limit_s: float = 120.0
     claims: Claims = NOTHING
+    generated: Path | None = None
+
+    def stand(self) -> "Stand":
+        """Return the system with all that its declarations say."""
+        from rcsc.run.episodes.stand import stand  # loads the language, as a run does
+
+        return stand(self.system, self.generated)
+
+    def loop(self, episode: E) -> "Loop":
+        """Begin an episode, with what was proved watched."""
+        return self.kind.loop(episode, self)
 
     def run(self, episode: E, log: Path | None) -> EpisodeOutcome:
-        """Run an episode, with what was proved watched."""
-        return self.kind.run(episode, self.system, log, self.claims)
+        """Run an episode to its end."""
+        return self.loop(episode).finish(log)
+
+    def drawn(self, random: Random, seed: int) -> E:
+        """Return an episode of what `random` says; whatever else is random in it hangs on the seed."""
+        return replace(self.kind.draw(random, self), executor=self.executor, seed=seed)
 
     def episode(self, seed: int, index: int) -> E:
         """Return episode `index` of the campaign of `seed`."""
-        drawn = self.kind.draw(episode_seed(seed, index), self.system, self.plant, self.script)
-        return replace(drawn, executor=self.executor)
+        number = episode_seed(seed, index)
+        return self.drawn(by_seed(number), number)
 
 
 def episode_seed(seed: int, index: int) -> int:

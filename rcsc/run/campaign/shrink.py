@@ -3,9 +3,9 @@
 In: an episode and what it means to fail. Out: an episode that fails, from which nothing that was tried can be left out. Lists lose
 elements, larger runs of them first; then numbers move toward what is usual: a field's default, a window of one tick.
 
-It stands beside Hypothesis, which shrinks what it drew and not an episode: of the docking robot whose drive forgets that it began anew,
-an episode of eight orders and faults becomes one of two in 23 runs here, and stays at eight in 34 where Hypothesis draws its seed. An
-episode that Hypothesis drew choice by choice, another one, came to five in 65.
+It stands beside Hypothesis, which shrinks what it drew and not an episode, and so none that came by a seed or from a file: of the docking
+robot whose drive forgets that it began anew, an episode of eight orders and faults becomes one of two in 23 runs here. An episode that
+Hypothesis drew choice by choice, another one, came to five in 65 by its own shrinking.
 
 Source: Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input (2002), for removing by halves.
 """

@@ -23,12 +23,12 @@ from it is *excused*, with the fault that explains it, and so is what a false re
 Where no plant is given, what comes from outside moves in its range, and whoever is ordered obeys (`subordinates`). What was proved of the
 levels is watched as well (`proved`).
 
-The same seed draws the same episode; the same episode has the same outcome, with the executors in C and those in Python. Trusted:
+The same seed draws the same episode; the same episode has the same outcome, with the executors in C and those in Python; with `both` they
+run side by side, and a difference is a finding. Trusted:
 the plant, and the reference interpreter for what a property means. An episode proves nothing: that is `rcsc prove`. It costs some 0.1 ms a
 cycle and level.
 
 Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `operator` (who orders),
 `subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what was proved), `properties`, `harm`
-(buffers in which something goes wrong, and whose fault it is), `loop` (runs one), `sampling` (draws one), `search` (looks for one that
-breaks a property, with Hypothesis).
+(buffers in which something goes wrong, and whose fault it is), `loop` (runs one), `sampling` (draws one, by seed or for Hypothesis).
 """

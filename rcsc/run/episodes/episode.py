@@ -8,6 +8,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from itertools import chain
+from random import Random
 from typing import ClassVar, Literal, Self, TypeAlias, get_args, get_type_hints
 
 from rcsc.base.host.files import csv_text
@@ -208,13 +209,16 @@ class Episode(SavedEpisode):
                 _order_told(order, first=all(order.level != before.level for before in self.orders[:at]))
                 for at, order in enumerate(self.orders)
             ),
-            *(f"{_window(harm)}: buffer `{harm.buffer}` {_HARMS[harm.kind]}" for harm in self.harms),
-            *(f"{_window(reading)}: `{reading.field}` = {_cell(reading.value)}" for reading in self.readings),
+            *(f"{window_told(harm)}: buffer `{harm.buffer}` {_HARMS[harm.kind]}" for harm in self.harms),
+            *(
+                f"{window_told(reading)}: `{reading.field}` = {_cell(reading.value)}"
+                for reading in self.readings
+            ),
             *(
                 f"before tick {restart.tick}: level `{restart.level}` starts anew"
                 for restart in self.restarts
             ),
-            *(f"{_window(switch)}: the plant's fault `{switch.fault}`" for switch in self.switches),
+            *(f"{window_told(switch)}: the plant's fault `{switch.fault}`" for switch in self.switches),
         )
 
     def script(self) -> str:
@@ -243,6 +247,23 @@ class Episode(SavedEpisode):
         return csv_text(rows)
 
 
+def by_seed(seed: int) -> Random:
+    """Return what draws the episode of a seed."""
+    return Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
+
+
+def happens(random: Random, share: float) -> bool:
+    """Whether something happens that does in this share of all cases; the simplest answer is no.
+
+    Whole numbers alone are drawn: floats Hypothesis takes from edges, and copies from one place to another.
+    """
+    return random.randrange(_PARTS) >= round(_PARTS * (1 - share))
+
+
+_PARTS = 100
+"""Into which chances are divided: Hypothesis draws small numbers more often where there are more of them."""
+
+
 _HARMS = {
     "lost": "loses what is published",
     "late": "is late",
@@ -251,7 +272,8 @@ _HARMS = {
 }
 
 
-def _window(window: BufferFault | Reading | Switch) -> str:
+def window_told(window: BufferFault | Reading | Switch) -> str:
+    """Return the ticks of a window in words."""
     if window.first_tick == window.last_tick:
         return f"tick {window.first_tick}"
     return f"ticks {window.first_tick} .. {window.last_tick}"

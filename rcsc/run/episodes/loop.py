@@ -15,7 +15,7 @@ from rcsc.run.episodes.episode import Episode, Reading
 from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
-from rcsc.run.episodes.properties import ENDS, NO_ERROR, properties, was_refused
+from rcsc.run.episodes.properties import AGREE, ENDS, NO_ERROR, properties, was_refused
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Field, Stand, stand
@@ -370,7 +370,9 @@ class Loop:
             self._end = "hang"
             if not self._stage.outside:
                 return  # nothing outside moves, for which a command may wait
-        because = self._explained.because(broken)
+        if name == AGREE:
+            self._end = "executors differ"  # no input explains that
+        because = "" if name == AGREE else self._explained.because(broken)
         if because:
             self._seen.excused.setdefault(name, Excused(name, tick, message, because))
         else:

@@ -15,6 +15,7 @@ from rcsc.run.episodes.operator import Given
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Stand
+from rcsc.run.executors import Twins
 from rcsc.run.levels import RunningLevel
 from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.plant.bind import BoundPlant, raised
@@ -24,6 +25,19 @@ REFUSED = FAULTS.index("input refused")
 NO_ERROR = "no state-table error"
 REFUSES = "refuses what lies out of range"
 ENDS = "every command ends"
+AGREE = "C and Python do the same"
+
+
+class ExecutorsAgree:
+    """The C and the Python of a level leave the same of every cycle, where both run."""
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Yield each level of which they do not, with the first value that differs."""
+        for level in cycle.ran:
+            if isinstance(level.executor, Twins) and level.executor.difference:
+                yield Broken(
+                    AGREE, f"level `{level.name}`, {level.ran}: {level.executor.difference}", level.name
+                )
 
 
 class NoStateTableError:
@@ -324,7 +338,7 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
         within: Cycles without a fault in which every command ends.
         claims: What was proved of the system.
     """
-    watching: list[Property] = [NoStateTableError(), Refuses(), AssumptionsHold(stand)]
+    watching: list[Property] = [ExecutorsAgree(), NoStateTableError(), Refuses(), AssumptionsHold(stand)]
     for name, program in stand.programs.items():
         watching += [_of_level(name, stand.signs[name], stated) for stated in program.properties]
     for link in stand.links:

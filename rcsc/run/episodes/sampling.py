@@ -1,7 +1,8 @@
-"""Episodes by seed, leaning on edges: orders from the declared commands and ranges, and what goes wrong from the declared buffers.
+"""Episodes that are drawn, leaning on edges: orders from the declared commands and ranges, and what goes wrong from the declared buffers.
 
-In: a seed. Out: an `Episode`. One in five has no fault; the others have one, or several. It draws from `Random`, as a worker makes episode
-number N of a campaign from N alone; Hypothesis gives the same strategy seeds (`search`).
+In: a `Random`. Out: an `Episode`. One in five has no fault; the others have one, or several. A worker makes episode number N of a campaign
+from N alone (`by_seed`). Hypothesis gives a `Random` of its own, and so draws every order, fault and tick (`rcsc.run.campaign.search`):
+the simplest answers, the first choice, the lowest number and no chance taken, make the simplest episode.
 """
 
 import math
@@ -22,6 +23,8 @@ from rcsc.run.episodes.episode import (
     Restart,
     Setting,
     Switch,
+    by_seed,
+    happens,
 )
 from rcsc.run.episodes.operator import NO_NUMBER, between, setting_of
 from rcsc.run.episodes.stand import Field, Stand, stand, switches
@@ -32,7 +35,7 @@ from rcsc.run.signature import Value
 NOMINAL, SCRIPTED, PLAIN = 0.2, 0.3, 0.5
 """How often nothing goes wrong, orders are those of a script, and a field is as at first."""
 MOST_ORDERS, MOST_FAULTS = 4, 4
-LATEST, SOON = 11.0, 300
+LATEST, SOON = 11, 300
 """Binary logarithm of the latest tick at which something begins; half of all begin before `SOON`."""
 LASTING = (1, 2, 5, 20, 60, 200)
 LONG = (1000, 4000)
@@ -75,15 +78,23 @@ def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode
     Raises:
         CodedError: As `draw`.
     """
-    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
+    return replace(drawn(by_seed(seed), its, plant, script), seed=seed)
+
+
+def drawn(random: Random, its: Stand, plant: str = "", script: str = "") -> Episode:
+    """Return an episode of what `random` says.
+
+    Raises:
+        CodedError: As `draw`.
+    """
     orders = tuple(_orders(random, its, script, plant))
     ticks = 0 if orders else random.choice(UNORDERED)
     outside = () if its.stands_outside(plant) else tuple(moving(random, its))
-    episode = Episode(plant, seed=seed, orders=orders, readings=outside, ticks=ticks)
+    episode = Episode(plant, orders=orders, readings=outside, ticks=ticks)
     adds = _kinds(its, switches(its, plant))
-    if not adds or random.random() < NOMINAL:
+    if not adds or not happens(random, 1 - NOMINAL):
         return episode
-    for _ in range(1 if random.random() < 0.6 else random.randint(2, MOST_FAULTS)):
+    for _ in range(random.randint(2, MOST_FAULTS) if happens(random, 0.4) else 1):
         episode = random.choice(adds)(random, its, episode)
     return episode
 
@@ -93,7 +104,7 @@ def draw_on(its: Stand, seed: int, plant: str = "", script: str = "") -> Episode
 
 def _orders(random: Random, its: Stand, script: str, plant: str) -> Iterator[OrderSpec]:
     """Yield the orders to every level: of a script as they are, or each after, at or before the end of the one before."""
-    rows = scripted(its, script, plant) if script or random.random() < SCRIPTED else ()
+    rows = scripted(its, script, plant) if script or happens(random, SCRIPTED) else ()
     if rows:
         for row in rows:
             wait, interrupts = _when(random, 0.15)
@@ -109,7 +120,7 @@ def _order(random: Random, its: Stand, level: Served, *, first: bool) -> OrderSp
     for place, leaf in enumerate(level.order_leaves):
         if place == level.command:
             command = random.choice(leaf.members)
-        elif place != level.number and random.random() >= PLAIN:
+        elif place != level.number and happens(random, 1 - PLAIN):
             value = between(random, leaf, its.edges[level.level][leaf.name])
             fields.append(FieldValue(field_of(leaf), setting_of(leaf, value)))
     wait, interrupts = (random.choice((0, 0, 1, 3)), False) if first else _when(random, 0.3)
@@ -118,7 +129,7 @@ def _order(random: Random, its: Stand, level: Served, *, first: bool) -> OrderSp
 
 def _when(random: Random, often: float) -> tuple[int, bool]:
     """When an order is given; `often` it comes before the end of the one before."""
-    if random.random() < often:
+    if happens(random, often):
         return tick(random), True
     return random.choice((0, 0, 0, 1, 2, 30)), False
 
@@ -170,7 +181,9 @@ def _values(level: Served, order: Sequence[Value]) -> Iterator[tuple[int, bool |
 
 def tick(random: Random) -> int:
     """Return a tick at which something may be under way; early ones oftener than late ones."""
-    return random.randint(0, SOON) if random.random() < 0.5 else int(2 ** random.uniform(0, LATEST)) - 1
+    return (
+        int(2 ** (random.randint(0, 8 * LATEST) / 8)) - 1 if happens(random, 0.5) else random.randint(0, SOON)
+    )
 
 
 def _window(random: Random, lasting: Sequence[int]) -> tuple[int, int]:
@@ -191,7 +204,7 @@ def _restart(random: Random, its: Stand, episode: Episode) -> Episode:
         reading for reading in episode.readings if reading.refused or reading.value in past[reading.field]
     ]
     at = tick(random)
-    if refused and random.random() < TOGETHER:
+    if refused and happens(random, TOGETHER):
         window = random.choice(refused)
         at = random.randint(window.first_tick, window.last_tick)
     restart = Restart(at, random.choice(list(its.signs)))
@@ -205,7 +218,7 @@ def _reading(random: Random, its: Stand, episode: Episode) -> Episode:
 
 def _read(random: Random, field: Field) -> Setting:
     """Return a value that the level takes, as it is or at the edge of its range."""
-    if field.past and random.random() < PAST:
+    if field.past and happens(random, PAST):
         return setting_of(field.leaf, random.choice(field.past))
     return setting_of(field.leaf, between(random, field.leaf, field.edges))
 
@@ -227,12 +240,12 @@ def refusable(random: Random, field: Field) -> Setting:
 def moving(random: Random, its: Stand) -> Iterator[Reading]:
     """Yield what comes from outside where no plant is given: values that change at any moment, edges oftener, now and then refused ones."""
     for field in its.fields:
-        if random.random() < STILL:
+        if not happens(random, 1 - STILL):
             continue
         at, last, lasting = 0, random.choice(MOVING), random.choice(LASTING)
         while at < last:
             ticks = random.choice((1, lasting, 2 * lasting))
-            refused = bool(field.refused) and random.random() < REFUSED
+            refused = bool(field.refused) and happens(random, REFUSED)
             value = refusable(random, field) if refused else _read(random, field)
             yield Reading(field.name, value, at, at + ticks - 1, refused=refused)
             at += ticks

@@ -4,6 +4,7 @@ In: parts, a script, what goes wrong and when. Out: rows, findings, lines of tab
 the same outcome in every process and with both kinds of executors.
 """
 
+import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import chain
@@ -12,7 +13,7 @@ from typing import ClassVar, get_args
 
 from rcsc.base.host.files.names import shown
 from rcsc.run.episodes.episode import FAULTS as OF_ANY_SYSTEM
-from rcsc.run.episodes.episode import BufferFault, Harm, Restart, SavedEpisode, Switch
+from rcsc.run.episodes.episode import BufferFault, Harm, Restart, SavedEpisode, Switch, window_told
 from rcsc.run.episodes.episode import Episode as EpisodeOfAnySystem
 from rcsc.run.system import Kind
 from rcsc_cell.cell.faults import Faults
@@ -63,12 +64,27 @@ class PartSpec:
     density_kg_m3: float = 2700.0
     friction: float = 0.4
 
+    def told(self) -> str:
+        """Return it in words, with what is not usual of it."""
+        size = f", {' x '.join(f'{side:g}' for side in self.size_mm)} mm large" if self.size_mm else ""
+        weight = "" if self.density_kg_m3 == 2700.0 else f", of {self.density_kg_m3:g} kg/m3"
+        slides = "" if self.friction == 0.4 else f", with friction {self.friction:g}"
+        return (
+            f"`{self.object}` lies on `{self.station}` at x = {self.x_mm:g} mm, y = {self.y_mm:g} mm, "
+            f"turned by {self.yaw_deg:g} degrees{size}{weight}{slides}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class SwitchTo(Switch):
     """A switch of `rcsc_cell.cell.faults.Faults` is set to a value in these ticks."""
 
     value: float = 1.0
+
+    def told(self) -> str:
+        """Return it in words."""
+        graded = "" if isinstance(getattr(Faults(), self.fault), bool) else f" = {self.value:g}"
+        return f"{window_told(self)}: the cell's fault `{self.fault}`{graded}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +168,33 @@ class Episode(SavedEpisode):
                 value = getattr(element, name, ())
                 yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
 
+    def told(self) -> tuple[str, ...]:
+        """Return the episode in words, a line for each thing in it."""
+        steps = f"by contact physics, in steps of {1000 * self.step_s:g} ms"
+        return (
+            f"the cell moves {steps if self.backend == 'mujoco' else 'by kinematics alone'}; seed {self.seed}",
+            *(f"part {number}: {part.told()}" for number, part in enumerate(self.parts)),
+            *(f"row {number}: `{_row_told(row)}`" for number, row in enumerate(self.rows, 1)),
+            *self.in_any_system().told(),
+            *(fault.told() for fault in self.faults),
+            *(
+                f"tick {one.tick}: `task` is ordered `{_row_told(one.row)}`, whatever is under way"
+                for one in self.interruptions
+            ),
+            *(
+                f"before tick {push.tick}: part {push.part} is pushed by x = {push.x_mm:g} mm, y = {push.y_mm:g} mm"
+                for push in self.pushes
+            ),
+        )
+
     def script(self) -> str:
         """Return its rows as a script."""
         return script(self.rows)
+
+
+def _row_told(row: str) -> str:
+    """Return a row of a script as a report has it, without its commas."""
+    return " ".join(cell for cell in next(csv.reader([row])) if cell)
 
 
 def script(rows: Sequence[str]) -> str:

@@ -5,41 +5,47 @@ In: what `rcsc.run.campaign` asks of a kind of episodes. Out: `CELL`. The plant'
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import get_args
+from random import Random
+from typing import TYPE_CHECKING, get_args
 
 from rcsc.base.host.files.names import shown
 from rcsc.base.host.files.read import rows_of
-from rcsc.run.campaign.rig import EpisodeKind, NamedFile, programs, run_sources, sources
+from rcsc.run.campaign.rig import EpisodeKind, NamedFile, Rig, programs, run_sources, sources
 from rcsc.run.description import BadDescription, description
-from rcsc.run.episodes.outcome import EpisodeOutcome
-from rcsc.run.episodes.proved.claims import Claims
 from rcsc.run.executors import NotBuilt
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.database.build import BadData
 from rcsc_cell.episodes.episode import FAULTS, Episode, PartSpec, script
-from rcsc_cell.episodes.sampling import draw
+from rcsc_cell.episodes.sampling import drawn
 from rcsc_cell.workstation.script import COLUMNS, PARTS
+
+if TYPE_CHECKING:
+    from rcsc_cell.episodes.loop import Loop
 
 _CHUNKS = {"kinematic": 10, "mujoco": 4}
 
 
-def _drawn(seed: int, system: Path, plant: str, _script: str) -> Episode:
-    """Return the episode of a seed. Raises BadDescription: the plant is not called as one of the cell's."""
+def _drawn(random: Random, rig: Rig[Episode]) -> Episode:
+    """Return an episode of what `random` says.
+
+    Raises:
+        BadDescription: The plant is not called as one of the cell's.
+    """
     for backend in get_args(Backend):
-        if plant == backend:
-            return draw(seed, backend, system)
+        if rig.plant == backend:
+            return drawn(random, backend, rig.stand().system)
     raise BadDescription(
-        f"episodes of the cell are of plants {' and '.join(get_args(Backend))}, not {shown(plant)}"
+        f"episodes of the cell are of plants {' and '.join(get_args(Backend))}, not {shown(rig.plant)}"
     )
 
 
-def _run(episode: Episode, system: Path, log: Path | None, claims: Claims) -> EpisodeOutcome:
-    """Return the outcome of an episode."""
+def _begun(episode: Episode, rig: Rig[Episode]) -> "Loop":
+    """Begin an episode."""
     from rcsc_cell.episodes.loop import (
-        run,  # of an extra, which is asked for by its name before anything is run
+        Loop,  # of an extra, which is asked for by its name before anything is run
     )
 
-    return run(episode, system, log, claims)
+    return Loop(episode, rig.stand(), claims=rig.claims)
 
 
 def _admit(episode: Episode, system: Path, plant: str) -> Episode:  # noqa: ARG001  # it runs on its own
@@ -114,6 +120,6 @@ def _chunk(system: Path, plant: str) -> int:  # noqa: ARG001  # a matter of phys
 
 
 CELL = EpisodeKind(
-    _drawn, _run, Episode.from_json, _admit, fault_classes, _faults, _files,
-    not_in_order=(BadDescription, BadData, NotBuilt), chunk=_chunk, extra="cell", takes_script=False,
+    _drawn, _begun, Episode.from_json, _admit, fault_classes, _faults, _files,
+    not_in_order=(BadDescription, BadData, NotBuilt), chunk=_chunk, extra="cell", takes_script=False, told=Episode.told,
 )  # fmt: skip

@@ -45,7 +45,7 @@ class Loop(loop.Loop):
 
     Args:
         episode: What to run.
-        system: The description of the system.
+        system: The system, or its description.
         properties: What watches, beside what watches any system.
         claims: What was proved of the system, which is watched, too.
 
@@ -61,7 +61,7 @@ class Loop(loop.Loop):
     def __init__(
         self,
         episode: Episode,
-        system: Path = SYSTEM,
+        system: Path | Stand = SYSTEM,
         properties: Sequence[PropertyClass] = PROPERTIES,
         claims: Claims = NOTHING,
     ) -> None:
@@ -233,18 +233,19 @@ def run(
 # --- what a loop is made of ---
 
 
-def _ready(system: Path) -> tuple[Stand, Database]:
+_DATABASES: dict[tuple[tuple[tuple[str, int], ...], int], Database] = {}
+"""By the files of a stand, and the time of the data."""
+
+
+def _ready(system: Path | Stand) -> tuple[Stand, Database]:
     """Return the system with its database, read once while their files do not change."""
-    its = stand(system)
+    its = system if isinstance(system, Stand) else stand(system)
     data = its.system.database
-    return its, _database(system, its.files, data.stat().st_mtime_ns if data.is_file() else 0)
-
-
-@lru_cache(maxsize=64)
-def _database(system: Path, _files: tuple[tuple[str, int], ...], _time_ns: int) -> Database:
-    its = stand(system)
-    needs_cell(its.system, its.signs)
-    return database_of(its.system, its.signs)
+    key = its.files, data.stat().st_mtime_ns if data.is_file() else 0
+    if key not in _DATABASES:
+        needs_cell(its.system, its.signs)
+        _DATABASES[key] = database_of(its.system, its.signs)
+    return its, _DATABASES[key]
 
 
 @lru_cache(maxsize=1024)

@@ -1,17 +1,18 @@
-"""Episodes by seed, for campaigns: no Hypothesis, leaning on edges.
+"""Episodes of the cell that are drawn, leaning on edges: parts and where they lie, rows of a script, and what goes wrong.
 
-In: a seed. Out: an `Episode`. One in five is nominal; the others have one fault, or several; one in six has a script that is not
-legal. With physics only scripts that keep a held part clear of the furniture: choosing the way is up to the workstation.
+In: a `Random`, of a seed or Hypothesis's own, whose simplest answers make the simplest episode. Out: an `Episode`. One in five is nominal;
+the others have one fault, or several; one in six has a script that is not legal. With physics only scripts that keep a held part clear of
+the furniture: choosing the way is up to the workstation.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 from random import Random
 
 from rcsc.run.description import Description, description
-from rcsc.run.episodes.episode import BufferFault, Harm, Restart
+from rcsc.run.episodes.episode import BufferFault, Harm, Restart, by_seed, happens
 from rcsc_cell.cell.faults import Faults
 from rcsc_cell.cell.ready import Backend
 from rcsc_cell.episodes.episode import SYSTEM, Episode, Interruption, PartSpec, Push, SwitchTo
@@ -49,6 +50,22 @@ MAKE_BOXT = (
 )
 """The first rows of Fig. 7, as corrected."""
 EMPTY_HAND = ("MOVE,,,WS-SAFE,", "MOVE,,,FIX-SAFE,", "MOVE,,,BUFFER-SAFE,", "MOVE,,,V-BLK2,", "PAUSE,,,,")
+FOLLOWING: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "lies": (
+        ("TRANSFER,{part},BUFFER,STATION({sector}),WS-SAFE", "put"),
+        ("ACQUIRE,{part},BUFFER,,", "held"),
+        ("TRANSFER,{part},BUFFER,STATION({sector}),", "put"),
+        ("MOVE,{part},BUFFER,STATION({sector}),", "over"),
+        *((row, "lies") for row in EMPTY_HAND),
+    ),
+    "held": (("MOVE,,,WS-SAFE,", "carried"), ("RELEASE,,,,BUFFER-SAFE", "lies")),
+    "carried": (("CLEAR,,,STATION({sector}),", "put"), ("PAUSE,,,,", "carried")),
+    "over": (("RELEASE,,,,WS-SAFE", "put"), ("RELEASE,,,,", "put")),
+    "put": tuple((row, "put") for row in EMPTY_HAND),
+}
+"""What may be ordered when the part lies on the buffer, is held over it or at the safe place, is over a sector of the pallet, or was put
+there; each with what becomes of it."""
+MOST_ROWS = 5
 NOT_LEGAL = (
     "RELEASE,,,,",
     "CLEAR,,,STATION(1),",
@@ -75,12 +92,16 @@ def draw(seed: int, backend: Backend = "kinematic", system: Path = SYSTEM) -> Ep
         BadDescription: The system is not in order.
     """
     described = _described(system, system.stat().st_mtime_ns if system.is_file() else 0)
-    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
+    return replace(drawn(by_seed(seed), backend, described), seed=seed)
+
+
+def drawn(random: Random, backend: Backend, described: Description) -> Episode:
+    """Return an episode of what `random` says."""
     kind = random.choice(tuple(KINDS))
-    episode = Episode(backend, "c", seed, _parts(random, kind), _script(random, kind, backend))
-    if random.random() < 0.2:
+    episode = Episode(backend, parts=(place(random, kind),), rows=_script(random, kind, backend))
+    if not happens(random, 0.8):
         return episode
-    for _ in range(1 if random.random() < 0.6 else random.randint(2, 4)):
+    for _ in range(random.randint(2, 4) if happens(random, 0.4) else 1):
         episode = random.choice(INJECTIONS)(random, described, episode)
     return episode
 
@@ -95,33 +116,30 @@ def _described(system: Path, _time_ns: int) -> Description:
 
 def place(random: Random, kind: str) -> PartSpec:
     """Return a part somewhere on the buffer, where the camera sees it from its first pose."""
-    edge = random.random() < 0.2
-    x_mm = random.choice((-80.0, 60.0)) if edge else random.uniform(-70.0, 50.0)
-    y_mm = random.choice((-80.0, 80.0)) if edge else random.uniform(-70.0, 70.0)
-    return PartSpec(kind, "buffer", round(x_mm, 1), round(y_mm, 1), round(random.uniform(-85.0, 85.0), 1))
-
-
-def _parts(random: Random, kind: str) -> tuple[PartSpec, ...]:
-    return (place(random, kind),)
+    edge = happens(random, 0.2)
+    x_mm = random.choice((-80.0, 60.0)) if edge else random.randint(-700, 500) / 10
+    y_mm = random.choice((-80.0, 80.0)) if edge else random.randint(-700, 700) / 10
+    return PartSpec(kind, "buffer", x_mm, y_mm, random.randint(-850, 850) / 10)
 
 
 def _script(random: Random, kind: str, backend: Backend) -> tuple[str, ...]:
-    part = f"{KINDS[kind]} (2)"
-    scripts: list[tuple[str, ...]] = [
-        (f"TRANSFER,{part},BUFFER,STATION({random.randint(0, 3)}),WS-SAFE",),
-        (f"ACQUIRE,{part},BUFFER,,", "MOVE,,,WS-SAFE,", f"CLEAR,,,STATION({random.randint(0, 3)}),"),
-        (f"ACQUIRE,{part},BUFFER,,", "RELEASE,,,,BUFFER-SAFE", f"TRANSFER,{part},BUFFER,STATION(1),"),
-        (f"MOVE,{part},BUFFER,STATION(2),", "RELEASE,,,,"),
-        (random.choice(EMPTY_HAND), random.choice(EMPTY_HAND), f"ACQUIRE,{part},BUFFER,,"),
-    ]
-    if kind == "tbox":
-        scripts += [MAKE_BOXT[: random.randint(1, len(MAKE_BOXT))]] * 2
-    rows = random.choice(scripts)
-    if random.random() < 1 / 6:
+    if kind == "tbox" and happens(random, 0.3):
+        rows = MAKE_BOXT[: random.randint(1, len(MAKE_BOXT))]
+    else:
+        rows = tuple(_rows(random, f"{KINDS[kind]} (2)"))
+    if happens(random, 1 / 6):
         bad = NOT_LEGAL if backend == "mujoco" else NOT_LEGAL + ONLY_WITHOUT_PHYSICS
         at = random.randint(0, len(rows))
         rows = (*rows[:at], random.choice(bad), *rows[at:])
     return rows
+
+
+def _rows(random: Random, part: str) -> Iterator[str]:
+    """Yield rows of which each can follow those before it."""
+    now = "lies"
+    for _ in range(random.randint(1, MOST_ROWS)):
+        row, now = random.choice(FOLLOWING[now])
+        yield row.format(part=part, sector=random.randint(0, 3)) if "{" in row else row
 
 
 # --- what goes wrong ---
@@ -129,7 +147,7 @@ def _script(random: Random, kind: str, backend: Backend) -> tuple[str, ...]:
 
 def when(random: Random, rows: Sequence[str]) -> int:
     """Return a tick at which something may be under way; the first ones more often than others."""
-    return random.choice((0, 1, 2)) if random.random() < 0.1 else random.randint(3, 250 + 40 * len(rows))
+    return random.choice((0, 1, 2)) if happens(random, 0.1) else random.randint(3, 250 + 40 * len(rows))
 
 
 def lasting(random: Random) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import click
 
@@ -39,6 +39,7 @@ from rcsc.run.description import description
 from rcsc.run.episodes.outcome import EpisodeFinding
 from rcsc.run.episodes.proved.claims import Claims
 from rcsc.run.episodes.stand import stand
+from rcsc.run.system import Kind
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 _TERMINAL_S, _PLAIN_S = 1.0, 10.0
@@ -70,8 +71,9 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 @click.option("--workers", type=click.IntRange(min=1), default=None, metavar="K",
               help="Processes here; one a processor when nobody says. The outcomes are the same with any number.")  # fmt: skip
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Which episodes.")
-@click.option("--executor", type=click.Choice(["c", "python"]), default=None,
-              help="Which of the generated executors run; c when nobody says, and with --again the episode's own.")  # fmt: skip
+@click.option("--executor", type=click.Choice(get_args(Kind)), default=None,
+              help="Which of the generated executors run, both side by side with `both`; c when nobody says, and with --again the "
+                   "episode's own.")  # fmt: skip
 @click.option("--journal", type=_TO, default=None, metavar="FILE",
               help="Where each episode's outcome is kept; else in .rcsc-cache beside the system, by seed and tables.")  # fmt: skip
 @click.option("--save", type=click.Path(file_okay=False, path_type=Path), default=Path("campaign"), show_default=True,
@@ -90,7 +92,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
               help="Watch each claim that `rcsc prove` calls proved of the levels; proves them where that was not done.")  # fmt: skip
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: Path | None, system: Path | None, plant: str | None, script: str | None, episodes: int, workers: int | None,
-    seed: int, executor: str | None, journal: Path | None, save: Path, json_: Path | None, limit_s: float,
+    seed: int, executor: Kind | None, journal: Path | None, save: Path, json_: Path | None, limit_s: float,
     scheduler: str | None, again: Path | None, compiles: bool, claims: bool,
 ) -> int:  # fmt: skip
     """Run episodes of SYSTEM: orders, lost buffers, restarts and faults of its plant by seed, with every property watching.
@@ -142,7 +144,7 @@ class CampaignOptions:
     json: Path | None
 
 
-def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit_s: float) -> Rig[Any]:
+def _rig(path: Path, plant: str | None, executor: Kind | None, script: str, limit_s: float) -> Rig[Any]:
     """Return the rig on which episodes are played.
 
     Raises:
@@ -156,9 +158,7 @@ def _rig(path: Path, plant: str | None, executor: str | None, script: str, limit
     need("cell" if spec is not None and spec.model is not None else kind.extra)
     if script and not kind.takes_script:
         raise click.UsageError("the episodes of this plant have scripts of their own, and take none")
-    return Rig(
-        kind, path.resolve(), plant_name(spec), "python" if executor == "python" else "c", script, limit_s
-    )
+    return Rig(kind, path.resolve(), plant_name(spec), executor or "c", script, limit_s)
 
 
 def _claims(rig: Rig[Any], *, wanted: bool, compiles: bool) -> Claims:
@@ -318,10 +318,10 @@ def _tell(where: str, finding: EpisodeFinding, happens: Sequence[str]) -> None:
         attach("note", line)
 
 
-def _again(path: Path, rig: Rig[Any], executor: str | None) -> int:
+def _again(path: Path, rig: Rig[Any], executor: Kind | None) -> int:
     """Run a saved episode, in a process of its own: it may take that with it."""
     with processes(1) as pool:
-        outcome = again(path, rig, None if executor is None else rig.executor, pool)
+        outcome = again(path, rig, executor, pool)
     happens = rig.kind.told(saved_episode(path, rig)) if outcome.findings else ()
     for number, text, state, reason, ticks in outcome.rows:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
