@@ -138,6 +138,10 @@ class Description:
         taken |= {f"{level.name}.display" for level in self.levels if self.displays}
         return tuple(name for name in outputs if name not in taken)
 
+    def taken_by(self, level: str) -> tuple[str, ...]:
+        """Return the buffers that a level takes, in order."""
+        return tuple(wire.source for wire in self.wires if wire.target.partition(".")[0] == level)
+
     def review(self) -> Document:
         """Return a fresh page for errors, with the places of this description."""
         if self.document is None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -125,7 +126,7 @@ def test_an_output_without_a_cycle_is_no_checkpoint(buffers: SharedMemoryBuffers
 
 def test_another_layout_is_not_believed(buffers: SharedMemoryBuffers) -> None:
     buffers.commit("wide", complete(3))
-    laid = Layout(buffers.layout.regions, buffers.layout.places, buffers.layout.size, buffers.layout.seed + 1)
+    laid = replace(buffers.layout, seed=buffers.layout.seed + 1)
     other = SharedMemoryBuffers(buffers.block, laid)
     assert other.latest("wide.out") is None
     assert other.checkpoint("wide") is NotShared.LOST
@@ -702,18 +703,38 @@ def test_who_never_began_is_not_waited_for_and_who_begins_again_is(scene: Scene)
 
 
 def test_who_does_not_move_is_waited_for_once(scene: Scene) -> None:
-    """Then the others go on without it; when it moves it is waited for again, and has to make up for nothing."""
+    """Then the others go on without it; when it moves it is where they are, waited for again, and has to make up for nothing."""
     for name, now_ms in {"a": 400, "b": 40, "c": 400}.items():
         scene.clocks.set(name, now_ms)
     assert scene.waited()
     assert MOST_WAIT_S < scene.now_s < MOST_WAIT_S + 1
-    assert scene.clocks.now_ms("a") == 80
     for _ in range(5):
         scene.turn.done()
+        scene.clocks.set("c", scene.turn.now_ms)
         assert not scene.waited()
-    scene.clocks.set("b", 80)
-    scene.meanwhile = [lambda: scene.clocks.set("b", 120), lambda: scene.clocks.set("b", 240)]
+    assert scene.clocks.left("b")
+    assert scene.clocks.common_end_ms() == scene.turn.now_ms + 1 == 601
+    Turn(scene.clocks, "b").done()
+    assert scene.clocks.now_ms("b") == 560
+    assert not scene.clocks.left("b")
+    scene.clocks.set("a", 640)
+    scene.meanwhile = [lambda: None, lambda: scene.clocks.set("b", 600)]
     assert scene.waited()
+
+
+def test_in_step_all_run_a_cycle_before_one_begins_the_next(scene: Scene) -> None:
+    """And wait for one that does not move for as long as it takes."""
+    in_step = Clocks(scene.clocks.block, 0, scene.clocks.periods_ms, in_step=True)
+    scene.turn = Turn(in_step, "a")
+    scene.all_at(80)
+    assert not scene.waited()
+    scene.turn.done()
+    nothing: list[Callable[[], None]] = [lambda: None] * int(2 * MOST_WAIT_S / LONGEST_NAP_S)
+    scene.meanwhile = [*nothing, lambda: scene.all_at(120)]
+    assert scene.waited()
+    assert in_step.common_end_ms() == 121
+    in_step.set("a", 160)
+    assert in_step.common_end_ms() == 121, "`a` cannot have begun what the others are not at"
 
 
 def test_a_wait_ends_when_it_is_told(scene: Scene) -> None:

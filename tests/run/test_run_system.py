@@ -148,9 +148,37 @@ def planted_beside(module: Path) -> None:
 
 @pytest.mark.usefixtures("here")
 def test_each_level_in_a_process_does_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["run", "dock", "--no-compile", "--executor", "python", "--processes", "--rate", "20"]) == 0
-    lines = capsys.readouterr().out.splitlines()[1:]
+    """In step their log is that of one process, byte for byte; else it says what fell otherwise, and is replayed all the same."""
+    quick = ["run", "dock", "--no-compile", "--executor", "python", "--report", "run.html", "--log"]
+    assert run([*quick, "one.mcap"]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if " done " in line]
+    assert run([*quick, "step.mcap", "--processes", "--in-step", "--rate", "20"]) == 0
+    first, *lines, last = capsys.readouterr().out.splitlines()
+    assert first == "each level in a process of its own, 20 times as fast as the clock"
+    assert (lines, last) == (rows, "log: step.mcap; report: run.html")
+    assert Path("step.mcap").read_bytes() == Path("one.mcap").read_bytes()
+    assert "undock" in Path("run.html").read_text(encoding="utf-8")
+    assert run([*quick[:-3], "--processes", "--rate", "20", "--log", "free.mcap"]) == 0
+    lines = capsys.readouterr().out.splitlines()[1:-1]
     assert [line.split()[1:3] for line in lines] == [["dock", "done"], ["stop", "done"], ["undock", "done"]]
+    assert run(["replay", "free.mcap", "--system", "dock", "--executor", "python"]) == 0
+    assert "nothing differs" in capsys.readouterr().out
+    assert run(["log", "free.mcap"]) == 0
+    assert "level supervisor: " in capsys.readouterr().out
+
+
+def test_processes_run_for_so_many_cycles(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With a script that is not over by then, and without one."""
+    quick = ["run", "dock", "--no-compile", "--executor", "python", "--cycles", "7", "--log"]
+    assert run([*quick, "one.mcap"]) == 1
+    assert run([*quick, "step.mcap", "--processes", "--in-step", "--rate", "20"]) == 1
+    assert stopped(capsys).splitlines()[-1] == "error[RCS724]: row 1 did not end in 7 cycles"
+    assert Path("step.mcap").read_bytes() == Path("one.mcap").read_bytes()
+    system = (here / "system.toml").read_text(encoding="utf-8")
+    (here / "system.toml").write_text(edited(system, ('script = "dock.csv"\n', "")), encoding="utf-8")
+    assert run([*quick, "step.mcap", "--processes", "--in-step", "--rate", "20"]) == 0
+    assert run([*quick, "one.mcap"]) == 0
+    assert Path("step.mcap").read_bytes() == Path("one.mcap").read_bytes()
 
 
 def test_what_is_wrong_is_told_before_a_process_is_begun(
@@ -269,8 +297,9 @@ def test_a_row_that_fails_stops_the_script_and_says_why(
         (["dok", "--system", "dock"], 2, "there is no script `dok`; did you mean `dock`?"),
         (["dock", "--script", "zzz.csv"], 2, "there is no script `zzz.csv`; those of `dock/system.toml` are dock, in"),
         (["dock", "--plant", "none.py"], 1, "error[RCS729]: there is no file `none.py`"),
-        (["dock", "--cycles", "5", "--processes"], 2, "--cycles are of one process"),
-        (["dock", "--log", "x.mcap", "--processes"], 2, "--log and --cycles are of one process"),
+        (["dock", "--live", "--processes"], 2, "--resume and --live are of one process"),
+        (["dock", "--in-step"], 2, "--in-step is of --processes"),
+        (["dock", "--log", "dock/rcsc.toml/x.mcap", "--processes"], 1, "the log dock/rcsc.toml/x.mcap cannot be written: "),
     ],
 )  # fmt: skip
 def test_what_is_meant_is_told_where_it_is_not_there(

@@ -7,7 +7,7 @@ period has, and no others. The chain tells damage; this tells what a chain that 
 
 import struct
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,15 +20,22 @@ from rcsc.run.log.finding import FINDING, LoggedFinding, finding_of
 from rcsc.run.log.records import ChainCheck, Seal, records
 from rcsc.run.log.schema import (
     BUFFERS,
+    EVENTS,
+    GAPS,
     LEVELS,
     PROGRAMS,
     RESTARTS,
     SIGNATURE,
     SYSTEM,
+    TAKEN,
+    Gap,
+    LoggedEvent,
+    event_of,
     message_format,
     restart_of,
     signature_from,
     system_of,
+    taken_layout,
 )
 from rcsc.run.signature import LevelSign, Signature, Values
 
@@ -109,6 +116,8 @@ class LoggedLevel:
 
     Attributes:
         restarts: In order, with what was set by hand; logs that were written before there were such records have none.
+        gaps: The ticks of its period without a record, and why: of a run in processes.
+        taken: The cycles that took other buffers than in one process, with the ticks in which those were given.
     """
 
     name: str
@@ -116,6 +125,17 @@ class LoggedLevel:
     level: LevelSign
     track: Track
     restarts: tuple[LoggedRestart, ...] = ()
+    gaps: Mapping[int, Gap] = field(default_factory=dict)
+    taken: Track | None = None
+
+    def follows(self, at: int) -> bool:
+        """Tell whether it is known from what state the cycle at this place began."""
+        if not self.gaps:
+            return True
+        after, until = self.track.ticks[at - 1], self.track.ticks[at]
+        unseen = [tick for tick in range(after + 1, until) if self.gaps.get(tick) is Gap.UNSEEN]
+        restart = self.restarted(at) if unseen else None
+        return not unseen or (restart is not None and restart.tick > max(unseen))
 
     def restarted(self, at: int) -> LoggedRestart | None:
         """Return the restart before the cycle at this place; None where it went on from the record before."""
@@ -143,6 +163,7 @@ class Log:
         buffers: Those that no level fills, by name.
         checked: What its chain says of it.
         finding: What the run breaks; None where it is not kept for that.
+        events: What became of its processes, in order; none of a run in one process.
     """
 
     facts: Mapping[str, str]
@@ -151,6 +172,7 @@ class Log:
     buffers: Mapping[str, Track]
     checked: ChainCheck
     finding: LoggedFinding | None = None
+    events: tuple[LoggedEvent, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -249,6 +271,7 @@ class _Reading:
     topics: dict[str, int] = field(default_factory=dict)
     begun: dict[int, tuple[Begun, str, struct.Struct]] = field(default_factory=dict)
     restarts: dict[str, list[LoggedRestart]] = field(default_factory=dict)
+    events: list[LoggedEvent] = field(default_factory=list)
 
     def take(self, record: McapRecord) -> None:
         """Notes one record."""
@@ -261,6 +284,10 @@ class _Reading:
                 self.tracks[channel].add(tick, content)
             case Message(channel_id=channel, sequence=tick, data=content) if channel in self.begun:
                 self._restart(*self.begun[channel], tick, content)
+            case Message(channel_id=channel, sequence=tick, data=content) if channel == self.topics.get(
+                EVENTS
+            ):
+                self.events.append(event_of(tick, content))
             case _:
                 pass
 
@@ -287,7 +314,13 @@ class _Reading:
             begun, level = restart_of(channel.topic)
             self.begun[channel.id] = begun, level, struct.Struct(message_format(self.signs[level].leaves))
             return
-        else:
+        elif channel.topic.startswith(GAPS):
+            self.tracks[channel.id] = Track(struct.Struct("<B"))
+        elif channel.topic.startswith(TAKEN):
+            system = system_of(self.metadata[SYSTEM], _NOWHERE, _NOWHERE)
+            taken = system.taken_by(channel.topic.removeprefix(TAKEN))
+            self.tracks[channel.id] = Track(taken_layout(taken)[1])
+        elif channel.topic != EVENTS:
             return
         self.topics[channel.topic] = channel.id
 
@@ -303,7 +336,9 @@ class _Reading:
             if topic.startswith(BUFFERS)
         }
         finding = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
-        log = Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, finding)
+        log = Log(
+            facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, finding, tuple(self.events)
+        )
         held = sum(len(track.ticks) for track in self.tracks.values())
         if log.last - log.first > _ALWAYS_TICKS + _TICKS_A_MESSAGE * held:
             raise ValueError(f"{log.last - log.first} ticks and {held} records")
@@ -318,7 +353,8 @@ class _Reading:
         if len({ticks[0] for ticks, _ in cycles.values()}) > 1:
             raise ValueError("its levels do not begin in one tick")
         if log.finding is None:  # in which levels run when they like
-            _check_cycles(cycles, log.tick_ms, whole=log.complete)
+            gaps = {level.name: level.gaps for level in log.levels}
+            _check_cycles(cycles, log.tick_ms, whole=log.complete, gaps=gaps)
         for level in log.levels:
             restarts = [each.tick for each in level.restarts]
             if any(tick not in log.ticks for tick in restarts) or restarts != sorted(restarts):
@@ -330,16 +366,27 @@ class _Reading:
         sign = self.signs[name]
         level = next(level for level in sign.levels if level.name == name)
         restarts = tuple(self.restarts.get(name, ()))
-        return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts)
+        gaps, taken = (self.tracks.get(self.topics.get(topic + name, -1)) for topic in (GAPS, TAKEN))
+        return LoggedLevel(
+            name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts,
+            {tick: Gap(int(why)) for tick, (why,) in gaps or ()}, taken,
+        )  # fmt: skip
 
 
-def _check_cycles(cycles: Mapping[str, tuple[Sequence[int], int]], tick_ms: int, *, whole: bool) -> None:
+def _check_cycles(
+    cycles: Mapping[str, tuple[Sequence[int], int]],
+    tick_ms: int,
+    *,
+    whole: bool,
+    gaps: Mapping[str, Collection[int]],
+) -> None:
     """See that each level has its cycles.
 
     Args:
         cycles: For each level the ticks of its records, the first that of the state it started from, and its period in ms.
         tick_ms: Length of a tick.
         whole: Whether the log has its end; else each may end anywhere.
+        gaps: Of each level the ticks in which the log says that it has no cycle of it.
 
     Raises:
         ValueError: One lacks a cycle, or has one that its period has not.
@@ -349,7 +396,8 @@ def _check_cycles(cycles: Mapping[str, tuple[Sequence[int], int]], tick_ms: int,
         if period_ms % tick_ms:
             raise ValueError(f"level `{name}` has a period of {period_ms} ms, in ticks of {tick_ms} ms")
         step, begun = period_ms // tick_ms, ticks[0]
-        due = range(begun + 1 + -begun % step, (last if whole else ticks[-1]) + 1, step)
+        every = range(begun + 1 + -begun % step, (last if whole else ticks[-1]) + 1, step)
+        due = [tick for tick in every if tick not in gaps[name]] if gaps[name] else every
         if len(due) != len(ticks) - 1 or any(map(int.__ne__, due, ticks[1:])):
             had = set(ticks[1:])
             at = next((tick for tick in due if tick not in had), None)

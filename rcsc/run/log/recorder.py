@@ -8,14 +8,14 @@ import contextlib
 import hashlib
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import BinaryIO, Protocol, Self
 
 from mcap.writer import CompressionType, Writer
 
 from rcsc.run.adopt import Begun, Restarted
-from rcsc.run.levels import RunningLevel
+from rcsc.run.description import Description
 from rcsc.run.log.finding import FINDING, LoggedFinding, finding_facts
 from rcsc.run.log.records import CHAIN, DIGEST, OPEN, SEAL
 from rcsc.run.log.schema import (
@@ -32,14 +32,69 @@ from rcsc.run.log.schema import (
     signature_text,
     system_facts,
 )
-from rcsc.run.signature import Leaf
-from rcsc.run.system import System
+from rcsc.run.signature import Leaf, Signature, Values
 
 CHUNK_MS = 1000
 """How much of the run a chunk holds, and so the most that a kill loses."""
 
 _MOST_OPEN = 8 << 20  # bytes after which a chunk ends before its time
 _NS_PER_MS = 1_000_000
+
+
+class RecordedLevel(Protocol):
+    """A level as its records need it."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def sign(self) -> Signature:
+        """Its program's signature."""
+        ...
+
+    @property
+    def values(self) -> Values:
+        """All leaves and the trace, as its last cycle left them."""
+        ...
+
+
+class RecordedBuffers(Protocol):
+    """Buffers as their records need them."""
+
+    def latest(self, name: str) -> Values | None:
+        """Return the latest value; None before the first."""
+        ...
+
+
+class Recorded(Protocol):
+    """What is recorded: a `System`, or what was seen of one that runs in other processes."""
+
+    @property
+    def description(self) -> Description:
+        """Its description."""
+        ...
+
+    @property
+    def levels(self) -> Sequence[RecordedLevel]:
+        """Its levels from the top down."""
+        ...
+
+    @property
+    def buffers(self) -> RecordedBuffers:
+        """Its buffers."""
+        ...
+
+    @property
+    def tick(self) -> int:
+        """Ticks done so far."""
+        ...
+
+    @property
+    def restarts(self) -> Sequence[Restarted]:
+        """Levels that were started again before the last tick."""
+        ...
 
 
 class _Chained:
@@ -99,7 +154,7 @@ class Recorder:
     again has a channel for that: each message is the state from which it goes on, at the tick of the cycle that it comes before.
     """
 
-    def __init__(self, system: System, path: Path, finding: LoggedFinding | None = None) -> None:
+    def __init__(self, system: Recorded, path: Path, finding: LoggedFinding | None = None) -> None:
         """Writes everything but the cycles, under another name first: a log that is there can be opened.
 
         Args:
@@ -127,7 +182,7 @@ class Recorder:
                 beside.unlink(missing_ok=True)
             raise
 
-    def _begin(self, system: System, finding: LoggedFinding | None) -> None:
+    def _begin(self, system: Recorded, finding: LoggedFinding | None) -> None:
         self._writer.start(profile="rcsc", library="rcsc")
         self._writer.add_metadata(SYSTEM, system_facts(system.description))
         self._writer.add_metadata(PROGRAMS, fingerprints(system.description))
@@ -137,7 +192,8 @@ class Recorder:
             level.name: (self._level_channel(level), level.sign.packed) for level in system.levels
         }
         self._restarts: dict[tuple[str, Begun], tuple[int, struct.Struct]] = {}
-        signs = {level.name: level.sign for level in system.levels}
+        self._aside: dict[str, int] = {}
+        signs = self._signs = {level.name: level.sign for level in system.levels}
         self._buffers = {
             wire.source: self._buffer_channel(wire.source, signs[taker].leaves_of(variable), wire.target)
             for wire in outside_wires(system.description)
@@ -149,7 +205,7 @@ class Recorder:
         self._write_buffers(system)
         self._end_chunk()
 
-    def _level_channel(self, level: RunningLevel) -> int:
+    def _level_channel(self, level: RecordedLevel) -> int:
         definition = message_definition(level.sign.leaves, level.sign.failed)
         schema = self._writer.register_schema(f"rcsc/{level.name}", "ros1msg", definition.encode())
         metadata = {SIGNATURE: signature_text(level.sign)}
@@ -164,7 +220,7 @@ class Recorder:
         channel = self._writer.register_channel(BUFFERS + source, "ros1", schema, {"target": target})
         return channel, struct.Struct(message_format(leaves))
 
-    def __call__(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
+    def __call__(self, system: Recorded, ran: Sequence[RecordedLevel]) -> None:
         """Write which levels were started again, what those that ran in this tick were left with, and what came from outside.
 
         Raises:
@@ -173,12 +229,25 @@ class Recorder:
         with self._reporting():
             self._tick = system.tick
             for restart in system.restarts:
-                self._write_restart(system.level(restart.level), restart, system.tick)
+                self._write_restart(restart, system.tick)
             for level in ran:
                 self._write_level(level, system.tick)
             self._write_buffers(system)
             if system.tick % self._ticks_a_chunk == 0:
                 self._end_chunk()
+
+    def aside(self, topic: str, fields: str, tick: int, content: bytes) -> None:
+        """Write what a tick has beside its cycles, before those of that tick; a log without any has no such channel.
+
+        Raises:
+            OSError: As of a tick.
+        """
+        with self._reporting():
+            if topic not in self._aside:
+                name = f"rcsc{topic.replace('/', '_')}"
+                schema = self._writer.register_schema(name, "ros1msg", fields.encode())
+                self._aside[topic] = self._writer.register_channel(topic, "ros1", schema)
+            self._write(self._aside[topic], tick, content)
 
     @contextlib.contextmanager
     def _reporting(self) -> Iterator[None]:
@@ -198,24 +267,25 @@ class Recorder:
         self._file.flush()
         self._kept = self._tick
 
-    def _write_level(self, level: RunningLevel, tick: int) -> None:
+    def _write_level(self, level: RecordedLevel, tick: int) -> None:
         channel, packed = self._levels[level.name]
         self._write(channel, tick, packed.pack(*level.values))
 
-    def _write_restart(self, level: RunningLevel, restarted: Restarted, tick: int) -> None:
-        key = level.name, restarted.begun
+    def _write_restart(self, restarted: Restarted, tick: int) -> None:
+        key = restarted.level, restarted.begun
         if key not in self._restarts:  # a log without one has no such channel
-            self._restarts[key] = self._restart_channel(level, restarted.begun)
+            self._restarts[key] = self._restart_channel(*key)
         channel, packed = self._restarts[key]
         self._write(channel, tick, packed.pack(*restarted.values))
 
-    def _restart_channel(self, level: RunningLevel, begun: Begun) -> tuple[int, struct.Struct]:
-        definition = message_definition(level.sign.leaves)
-        schema = self._writer.register_schema(f"rcsc/{level.name}_restart", "ros1msg", definition.encode())
-        channel = self._writer.register_channel(restart_topic(begun, level.name), "ros1", schema)
-        return channel, struct.Struct(message_format(level.sign.leaves))
+    def _restart_channel(self, level: str, begun: Begun) -> tuple[int, struct.Struct]:
+        leaves = self._signs[level].leaves
+        definition = message_definition(leaves)
+        schema = self._writer.register_schema(f"rcsc/{level}_restart", "ros1msg", definition.encode())
+        channel = self._writer.register_channel(restart_topic(begun, level), "ros1", schema)
+        return channel, struct.Struct(message_format(leaves))
 
-    def _write_buffers(self, system: System) -> None:
+    def _write_buffers(self, system: Recorded) -> None:
         for source, (channel, packed) in self._buffers.items():
             latest = system.buffers.latest(source)
             if latest is not None:

@@ -104,12 +104,12 @@ class _Again:
         )
 
     def cycle(self, at: int, answers: Answers) -> ReplayedCycle | None:
-        """Run the cycle whose record has this place; None for the state that recording started from.
+        """Run the cycle whose record has this place; None where it is not known from what it began, as for the first record.
 
         Raises:
             StateTableError: The tables are not proved for the recorded state, or an extern procedure failed.
         """
-        if at < 1:
+        if at < 1 or not self.logged.follows(at):
             return None
         track = self.logged.track
         recorded = track.layout.unpack(track.packed[at])

@@ -8,11 +8,13 @@ Source: MCAP specification, registry of well-known encodings (`ros1`, `ros1msg`)
 
 import hashlib
 import json
+import struct
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from enum import IntEnum
 from pathlib import Path
 
-from rcsc.base.host.files.names import file_name
+from rcsc.base.host.files.names import file_name, shown
 from rcsc.base.host.files.read import CheckedFields, content, json_of
 from rcsc.run.adopt import Begun
 from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
@@ -24,7 +26,10 @@ SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
 SIGNATURE = "rcsc.signature"
 """Key of a level's channel that holds its program's signature."""
 LEVELS, BUFFERS, RESTARTS = "/levels/", "/buffers/", "/restarts/"
-"""How the topics of channels begin."""
+GAPS, TAKEN = "/gaps/", "/taken/"
+"""How the topics of channels begin; the last two are of levels that run in processes of their own."""
+EVENTS = "/events"
+"""The topic of what became of processes."""
 
 ROS = {
     "bool": "bool", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
@@ -73,6 +78,62 @@ def restart_of(topic: str) -> tuple[Begun, str]:
     """
     begun, _, level = topic.removeprefix(RESTARTS).partition("/")
     return Begun(begun), level
+
+
+class Gap(IntEnum):
+    """The reason why a log has no record of a cycle that a level's period has."""
+
+    NOT_RUN = 0  # the level had no cycle then
+    UNSEEN = 1  # it had, and what it left could not be read
+
+
+GAP_FIELDS = "uint8 why # 0: the level had no cycle then; 1: it had, and what it left could not be read\n"
+EVENT_FIELDS = "string process\nstring what\n"
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """What became of a process.
+
+    Attributes:
+        tick: That of the cycle that was its next.
+    """
+
+    tick: int
+    process: str
+    what: str
+
+    @property
+    def content(self) -> bytes:
+        """The content of its message."""
+        texts = [text.encode() for text in (self.process, self.what)]
+        return b"".join(len(text).to_bytes(4, "little") + text for text in texts)
+
+
+def event_of(tick: int, content: bytes) -> LoggedEvent:
+    """Return the event of a message.
+
+    Raises:
+        ValueError: It is none.
+    """
+    texts, rest = [], content
+    for _ in range(2):
+        size = int.from_bytes(rest[:4], "little")
+        texts.append(rest[4 : 4 + size].decode())
+        rest = rest[4 + size :]
+    event = LoggedEvent(tick, *texts)
+    if event.content != content or not all(text.isprintable() for text in texts):
+        raise ValueError(f"{shown(repr(content)[:40])} is no event")
+    return event
+
+
+def taken_layout(buffers: Sequence[str]) -> tuple[str, struct.Struct]:
+    """Return the fields of the message that says of which ticks the buffers were that a level took, and its layout."""
+    fields = [
+        f"uint64 {name.replace('.', '_')} # the tick in which {name} was given; 0 for none\n"
+        for name in buffers
+    ]
+    return "".join(fields), struct.Struct(f"<{len(buffers)}Q")
 
 
 def message_format(leaves: Iterable[Leaf]) -> str:

@@ -7,6 +7,8 @@ a reader that meets a writer sees by the slot's stamp and checksum that it has t
 
     rcsc run make_boxt --processes
 
+A diagnostic process reads all that is committed, before it is written over, and keeps the log of the run.
+
 A level that dies is begun again from its last checkpoint, or anew: then what stands in its buffers is old, and it
 gives PAUSE first. A level whose *pulse* stops is taken for hung and replaced. Nothing is left in shared memory or on
 disk when the run ends, also after a kill: a keeper process sees to it.
@@ -21,6 +23,6 @@ Processes run by the clock, and on a machine that is too busy for that they run 
 cycle while another is more than a period behind.
 
 Modules, in the order the data flows: `block` is shared memory that is cleared away, `memory` the buffers in it,
-`clocks` how far each process has come, `serve` runs one level or one thing outside, `supervisor` begins them, watches
-their pulse and stops them.
+`clocks` how far each process has come, `serve` runs one level or one thing outside, `diagnose` records them all, `supervisor`
+begins them, watches their pulse and stops them.
 """

@@ -1,6 +1,6 @@
-"""Keep the processes of a system together: none runs far ahead of another.
+"""Keep the processes of a system together: none runs far ahead of another, nor of who records them.
 
-In: a block, and the period of each process. Out: `Clocks`, two words of the block for each process, and `Turn`, with which a
+In: a block, and the period of each process. Out: `Clocks`, three words of the block for each process, and `Turn`, with which a
 process waits for the others.
 
 In one process each level sees what the others gave in the cycle before, and tables count cycles: of how long an answer may take,
@@ -12,8 +12,13 @@ levels of 40 ms, of which `a` gets no processor:
     a: at 40                at 40               at 80
     b: at 80, runs it       at 120, waits       runs it
 
-This bounds how far they drift apart, by one period, whatever the machine does; it costs time only. A process that is replaced goes
-on where its clock stood, and is waited for meanwhile. One that does not move for `MOST_WAIT_S` is not waited for until it moves.
+This bounds how far they drift apart, by one period, whatever the machine does; it costs time only. *In step* it is none: all run a
+cycle before one begins the next. A process that is replaced goes on where its clock stood, and is waited for meanwhile. One that does
+not move for `MOST_WAIT_S` is not waited for until it moves, unless all are in step; then it skips the cycles that the others had meanwhile.
+
+A diagnostic process says of each process up to which time it has read what that committed. A process begins a cycle only when all but
+its last have been read. It writes over the last but one, so that whatever the machine does no cycle is lost to the record. A
+diagnostic process that ends is waited for no more: the supervisor says so.
 """
 
 import time
@@ -23,8 +28,10 @@ from dataclasses import dataclass, field
 from rcsc.run.processes.block import Block
 
 WORD = 8
+WORDS = 3
+"""Of each process: the time of its next cycle, its beats, and up to when it was read."""
 ABSENT = 0
-"""Instead of a time, which is kept one higher: the process has never been started."""
+"""Instead of a time, which is kept one higher: the process has never been started, or there is no such limit."""
 MOST_WAIT_S = 60.0
 SHORTEST_NAP_S, LONGEST_NAP_S = 20e-6, 5e-3
 
@@ -37,32 +44,37 @@ class Clocks:
         block: Where they are.
         first: Their first byte, a multiple of eight; they take `size` bytes.
         periods_ms: Of each process, by its name; the same mapping in every process.
+        in_step: Whether none begins a cycle before all have run the one before.
     """
 
     block: Block
     first: int
     periods_ms: Mapping[str, int]
+    in_step: bool = False
     _places: dict[str, int] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Give each process its place."""
-        places = {name: self.first + 2 * WORD * at for at, name in enumerate(self.periods_ms)}
+        places = {name: self.first + (2 + WORDS * at) * WORD for at, name in enumerate(self.periods_ms)}
         self._places.update(places)
 
     @staticmethod
     def size(processes: int) -> int:
         """Return the number of bytes that the clocks of so many processes take."""
-        return 2 * WORD * processes
+        return (2 + WORDS * processes) * WORD
 
     def start(self, name: str) -> None:
         """Make the others wait for a process from now on; one that ran before goes on where it stood."""
         if self.block.word(self._places[name]) == ABSENT:
             self.set(name, 0)
 
+    def leave(self, name: str) -> None:
+        """Have nobody wait for a process any more: it has ended for good."""
+        self.block.set_word(self._places[name], ABSENT)
+
     def now_ms(self, name: str) -> int | None:
         """Return the time of a process's next cycle, by the system's own time; None where it was never started."""
-        word = self.block.word(self._places[name])
-        return None if word == ABSENT else word - 1
+        return self._time(self._places[name])
 
     def set(self, name: str, now_ms: int) -> None:
         """Set the time of a process's next cycle."""
@@ -77,6 +89,68 @@ class Clocks:
         """Return a number that changes for as long as a process is alive and in no cycle."""
         return self.block.word(self._places[name] + WORD)
 
+    # --- who records them ---
+
+    def record(self, *, on: bool) -> None:
+        """Have all wait for a diagnostic process, or no more."""
+        self.block.set_word(self.first, int(on))
+
+    def was_read(self, name: str, now_ms: int) -> None:
+        """Say that all was read that a process committed in cycles before a time."""
+        self.block.set_word(self._places[name] + 2 * WORD, now_ms)
+
+    def read_ms(self, name: str) -> int:
+        """Return the time before which all was read that a process committed."""
+        return self.block.word(self._places[name] + 2 * WORD)
+
+    def unread(self, name: str, now_ms: int) -> bool:
+        """Tell whether a cycle of then would overwrite what the diagnostic process has not read."""
+        return bool(self.block.word(self.first)) and self.read_ms(name) < now_ms - self.periods_ms[name]
+
+    # --- the end ---
+
+    @property
+    def limit_ms(self) -> int | None:
+        """The time before which the last cycles begin; None for none."""
+        return self._time(self.first + WORD)
+
+    def stop_at(self, limit_ms: int) -> None:
+        """Have all run their cycles before a time, and none of then or later."""
+        self.block.set_word(self.first + WORD, limit_ms + 1)
+
+    def common_end_ms(self) -> int:
+        """Return the earliest time before which all cycles lie that may have begun."""
+        clocks = {name: now_ms for name in self.periods_ms if (now_ms := self.now_ms(name)) is not None}
+        left = {name for name in clocks if self.left(name)}
+        begun = [now_ms for name, now_ms in clocks.items() if not self.behind(name, now_ms).keys() - left]
+        return max(begun, default=-1) + 1
+
+    def left(self, name: str) -> bool:
+        """Tell whether the others have gone on without a process."""
+        now_ms = self.now_ms(name)
+        return now_ms is None or self.latest_ms(name) > now_ms + self.periods_ms[name]
+
+    def behind(self, name: str, now_ms: int) -> dict[str, int]:
+        """Return the clocks of the processes that one has to wait for before its cycle of then."""
+        behind = {}
+        for other, period_ms in self.periods_ms.items():
+            other_ms = self.now_ms(other)
+            apart_ms = 0 if self.in_step else period_ms
+            if other != name and other_ms is not None and other_ms + apart_ms < now_ms:
+                behind[other] = other_ms
+        return behind
+
+    def latest_ms(self, name: str) -> int:
+        """Return the time of the latest cycle that another process has run."""
+        clocks = ((other, self.now_ms(other)) for other in self.periods_ms if other != name)
+        return max(
+            (now_ms - self.periods_ms[other] for other, now_ms in clocks if now_ms is not None), default=0
+        )
+
+    def _time(self, at: int) -> int | None:
+        word = self.block.word(at)
+        return None if word == ABSENT else word - 1
+
 
 @dataclass(slots=True)
 class Turn:
@@ -87,18 +161,24 @@ class Turn:
     _left: dict[str, int] = field(default_factory=dict)
     """Who is not waited for, and where their clocks stood."""
 
+    @property
+    def now_ms(self) -> int:
+        """The time of its next cycle."""
+        return self.clocks.now_ms(self.name) or 0
+
     def done(self) -> None:
-        """End a cycle; the next is a period later."""
-        self.clocks.set(self.name, self._now_ms + self.clocks.periods_ms[self.name])
+        """End a cycle; the next is a period later, or where the others are if they went on without it."""
+        period_ms = self.clocks.periods_ms[self.name]
+        late_ms = self.clocks.latest_ms(self.name) - self.now_ms
+        self.clocks.set(self.name, self.now_ms + max(1, -(-late_ms // period_ms)) * period_ms)
 
     def wait(self, told: Sized = ()) -> None:
-        """Wait until no other is more than its period behind, or until something is `told`."""
+        """Wait until no other is more than its period behind and what was committed is read, or until something is `told`."""
         nap_s, since_s, before = SHORTEST_NAP_S, time.monotonic(), self._behind()
         self.clocks.beat(self.name)
-        while before and not told:
-            if time.monotonic() - since_s > MOST_WAIT_S:
-                self._go_on_without(before)
-                return
+        while (before or self._halted()) and not told:
+            if before and not self.clocks.in_step and time.monotonic() - since_s > MOST_WAIT_S:
+                self._left.update(before)
             time.sleep(nap_s)
             nap_s = min(2 * nap_s, LONGEST_NAP_S)
             self.clocks.beat(self.name)
@@ -106,21 +186,14 @@ class Turn:
             if behind != before:
                 nap_s, since_s, before = SHORTEST_NAP_S, time.monotonic(), behind
 
-    @property
-    def _now_ms(self) -> int:
-        return self.clocks.now_ms(self.name) or 0
+    def _halted(self) -> bool:
+        """Whether a cycle now would be one too many, or overwrite what is still to be recorded."""
+        limit_ms = self.clocks.limit_ms
+        return (limit_ms is not None and self.now_ms >= limit_ms) or self.clocks.unread(
+            self.name, self.now_ms
+        )
 
     def _behind(self) -> dict[str, int]:
         """Return the clocks of the processes that this one has to wait for."""
-        now_ms, behind = self._now_ms, {}
-        for name, period_ms in self.clocks.periods_ms.items():
-            other_ms = self.clocks.now_ms(name)
-            if other_ms is not None and other_ms + period_ms < now_ms and self._left.get(name) != other_ms:
-                behind[name] = other_ms
-        return behind
-
-    def _go_on_without(self, behind: Mapping[str, int]) -> None:
-        """Stop waiting for those that do not move; the time that they have lost is not made up for when they do."""
-        self._left.update(behind)
-        earliest_ms = min(other_ms + self.clocks.periods_ms[name] for name, other_ms in behind.items())
-        self.clocks.set(self.name, earliest_ms)
+        behind = self.clocks.behind(self.name, self.now_ms)
+        return {name: other_ms for name, other_ms in behind.items() if self._left.get(name) != other_ms}

@@ -11,6 +11,9 @@ writer fills the other slot and then sets the word: killed in between, it leaves
 starts with its own stamp, 0 while it is being written, and carries a checksum; a reader that meets a writer finds the
 stamp changed, and tries again. What does not agree with its checksum is never believed.
 
+A slot says in which cycle it was written, by the system's own time, and a level's with which cycles' buffers it ran: who reads both
+slots before the next but one is written (`clocks`) has missed none. A second region of a level says from what it began.
+
 One process writes a region; a level is not started twice.
 """
 
@@ -26,7 +29,11 @@ from rcsc.run.description import BadDescription, Description
 from rcsc.run.processes.block import Block
 from rcsc.run.signature import FORMATS, Signature, Values
 
-HEAD = struct.Struct("<QQII")  # stamp, which buffers are there, checksum, nothing
+HEAD = struct.Struct("<QQQII")  # stamp, which buffers are there, time of the cycle, checksum, nothing
+TICK, BEGUN = "Q", "B"
+"""Formats: of a time, which is kept one higher, and of how a level began."""
+NO_CYCLE_MS = -1
+"""The time of what was written in no cycle."""
 LINE = 64  # bytes of a cache line: writers of different regions do not slow each other
 CHECKPOINT = 1 << 63
 MOST_BUFFERS = 63
@@ -84,22 +91,29 @@ class Layout:
     """The places of all regions and buffers; the same in every process.
 
     Attributes:
+        takes: The buffers that each level takes, in order.
         seed: Of the checksums, from the layout itself: what another layout wrote is not believed.
     """
 
     regions: Mapping[str, SharedRegion]
     places: Mapping[str, BufferPlace]
+    takes: Mapping[str, tuple[str, ...]]
     size: int
     seed: int
 
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """The content of a committed slot."""
+    """The content of a committed slot.
+
+    Attributes:
+        now_ms: Time of the cycle that wrote it; `NO_CYCLE_MS` for none.
+    """
 
     stamp: int
     mask: int
     payload: bytes
+    now_ms: int
 
 
 def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
@@ -112,7 +126,11 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
     Raises:
         BadDescription: A buffer joins what does not fit, or nothing that is a level.
     """
-    payloads = {level.name: signs[level.name].packed for level in system.levels}
+    takes = {level.name: system.taken_by(level.name) for level in system.levels}
+    payloads = {
+        name: struct.Struct(signs[name].packed.format + TICK * len(taken)) for name, taken in takes.items()
+    }
+    payloads |= {begun(name): struct.Struct(f"<{BEGUN}{signs[name].packed.format[1:]}") for name in takes}
     places: dict[str, BufferPlace] = {}
     for wire in system.wires:
         owner, _, variable = wire.source.partition(".")
@@ -134,7 +152,12 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
             places[wire.source] = BufferPlace(wire.source, 0, packed, 1)
     if any(place.bit >= CHECKPOINT for place in places.values()):
         raise BadDescription(f"a level gives more than {MOST_BUFFERS} buffers")
-    return _laid(payloads, places)
+    return _laid(payloads, places, takes)
+
+
+def begun(level: str) -> str:
+    """Return the name of the region in which a level says from what it began."""
+    return f"{level}/begun"
 
 
 def _record(sign: Signature, variable: str) -> tuple[int, str]:
@@ -147,7 +170,11 @@ def _record(sign: Signature, variable: str) -> tuple[int, str]:
     return struct.calcsize("<" + "".join(formats[: run.start])), "".join(formats[run.start : run.stop])
 
 
-def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, BufferPlace]) -> Layout:
+def _laid(
+    payloads: Mapping[str, struct.Struct],
+    places: Mapping[str, BufferPlace],
+    takes: Mapping[str, tuple[str, ...]],
+) -> Layout:
     regions, at = {}, 0
     for name, packed in payloads.items():
         slot = -(-(HEAD.size + packed.size) // LINE) * LINE
@@ -155,7 +182,7 @@ def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, BufferPlac
         at += LINE + 2 * slot
     entries = [(name, region.at, region.packed.format) for name, region in regions.items()]
     entries += [(name, place.first, place.packed.format) for name, place in places.items()]
-    return Layout(regions, places, at, zlib.crc32(repr(entries).encode()))
+    return Layout(regions, places, takes, at, zlib.crc32(repr(entries).encode()))
 
 
 @dataclass(slots=True)
@@ -164,10 +191,15 @@ class SharedMemoryBuffers:
 
     Attributes:
         block: Where the regions are; whoever made it removes it.
+        now_ms: Time of the cycle that this process runs, for what it writes.
+        in_step: Whether it reads what was written in cycles before this one, and nothing newer.
     """
 
     block: Block
     layout: Layout
+    now_ms: int = NO_CYCLE_MS
+    in_step: bool = False
+    _taken_ms: dict[str, int] = field(default_factory=dict)
     _images: dict[str, Image] = field(default_factory=dict)
     _read: dict[str, tuple[bytes, Values]] = field(default_factory=dict)
 
@@ -203,10 +235,11 @@ class SharedMemoryBuffers:
     def latest(self, name: str) -> Values | None:
         """Return the latest value; None before the first. The same tuple, for as long as the value is the same."""
         place = self.layout.places[name]
-        held = self._image(place.region)
+        held = self._before(place.region) if self.in_step else self._image(place.region)
         known = self._read.get(name)
         if held is None or not held.mask & place.bit:
             return known[1] if known else None
+        self._taken_ms[name] = held.now_ms
         now = held.payload[place.first : place.first + place.packed.size]
         if known is not None and known[0] == now:
             return known[1]
@@ -221,16 +254,49 @@ class SharedMemoryBuffers:
             level: Its name.
             values: All leaves and the trace after a cycle.
         """
-        self._commit(level, CHECKPOINT | (CHECKPOINT - 1), self.layout.regions[level].packed.pack(*values))
+        taken = (self._taken_ms.get(name, NO_CYCLE_MS) + 1 for name in self.layout.takes[level])
+        packed = self.layout.regions[level].packed
+        self._commit(level, CHECKPOINT | (CHECKPOINT - 1), packed.pack(*values, *taken))
+
+    def committed(self, level: str, image: Image) -> tuple[Values, dict[str, int]]:
+        """Return the values of a level's committed slot, and for each buffer that it takes of which time that was."""
+        taken = self.layout.takes[level]
+        values: Values = self.layout.regions[level].packed.unpack(image.payload)
+        count = len(values) - len(taken)
+        return values[:count], {
+            name: int(now_ms) - 1 for name, now_ms in zip(taken, values[count:], strict=True)
+        }
+
+    def begin(self, level: str, how: int, values: Values) -> None:
+        """Say from which values a level goes on, and what they are."""
+        name = begun(level)
+        self._commit(name, 1, self.layout.regions[name].packed.pack(how, *values))
+
+    def since(self, region: str, stamp: int | None) -> list[Image | None]:
+        """Return what was committed to a region after that of a stamp, in order, None for what cannot be read: at most the last two."""
+        place = self.layout.regions[region]
+        for _ in range(TRIES):
+            now = self.block.word(place.at)
+            if now == stamp:
+                return []
+            before = (now - STEP) % STAMPS
+            found = [self._slot(place, each) for each in (before, now) if each != stamp]
+            if self.block.word(place.at) == now:
+                return found
+        return []
 
     def checkpoint(self, level: str) -> Values | NotShared:
         """Return all leaves and the trace after the level's last cycle; else why there is no checkpoint."""
         self._images.pop(level, None)
         held = self._image(level)
         if held is not None and held.mask & CHECKPOINT:
-            values: Values = self.layout.regions[level].packed.unpack(held.payload)
-            return values
+            return self.committed(level, held)[0]
         return NotShared.BLANK if held is not None and held.mask == 0 else NotShared.LOST
+
+    def checkpoint_ms(self, level: str) -> int:
+        """Return the time of the cycle that left the level's checkpoint; `NO_CYCLE_MS` for none."""
+        held = self._image(level)
+        return held.now_ms if held is not None and held.mask & CHECKPOINT else NO_CYCLE_MS
 
     def close(self) -> None:
         """Detach from the block."""
@@ -241,13 +307,21 @@ class SharedMemoryBuffers:
         held = self._image(name)
         # After garbage, a stamp that no reader has met: it would take the new value for one that it knows.
         stamp = ((held.stamp if held else time.time_ns()) + STEP) % STAMPS
-        image = HEAD.pack(stamp, mask, self._checksum(stamp, mask, payload), 0) + payload
+        when = self.now_ms + 1
+        image = HEAD.pack(stamp, mask, when, self._checksum(stamp, mask, when, payload), 0) + payload
         at = region.place(stamp)
         self.block.set_word(at, 0)
         self.block.write(at + 8, image[8:])
         self.block.set_word(at, stamp)
         self.block.set_word(region.at, stamp)
-        self._images[name] = Image(stamp, mask, payload)
+        self._images[name] = Image(stamp, mask, payload, self.now_ms)
+
+    def _before(self, name: str) -> Image | None:
+        """Return the latest slot of a cycle before this one: processes in step are at most one cycle ahead."""
+        newest = self._image(name)
+        if newest is None or newest.now_ms < self.now_ms:
+            return newest
+        return self._slot(self.layout.regions[name], (newest.stamp - STEP) % STAMPS)
 
     def _image(self, name: str) -> Image | None:
         """Return the committed slot; None where it cannot be trusted."""
@@ -269,11 +343,13 @@ class SharedMemoryBuffers:
         image = self.block.read(at, HEAD.size + region.packed.size)
         # The stamp before and after says that no writer was here; the checksum, that one had been, in whatever order
         # this machine shows one processor's stores to another.
-        written, mask, checksum, _ = HEAD.unpack_from(image)
+        written, mask, when, checksum, _ = HEAD.unpack_from(image)
         payload = image[HEAD.size :]
-        if not written == stamp == self.block.word(at) or checksum != self._checksum(stamp, mask, payload):
+        right = checksum == self._checksum(stamp, mask, when, payload)
+        if not right or not written == stamp == self.block.word(at):
             return None
-        return Image(stamp, mask, payload)
+        return Image(stamp, mask, payload, when - 1)
 
-    def _checksum(self, stamp: int, mask: int, payload: bytes) -> int:
-        return zlib.crc32(payload, zlib.crc32(struct.pack("<QQ", stamp, mask), self.layout.seed))
+    def _checksum(self, stamp: int, mask: int, when: int, payload: bytes) -> int:
+        head = struct.pack("<QQQ", stamp, mask, when)
+        return zlib.crc32(payload, zlib.crc32(head, self.layout.seed))

@@ -10,11 +10,12 @@ import os
 import signal
 import struct
 import time
+from collections import ChainMap
 from collections.abc import Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from rcsc.run.adopt import restart
+from rcsc.run.adopt import Begun, restart
 from rcsc.run.description import Description
 from rcsc.run.levels import RunningLevel, StateTableError, running_level
 from rcsc.run.processes.clocks import Clocks, Turn
@@ -58,6 +59,7 @@ class Setting:
     Attributes:
         queries: Makes the database's questions by name.
         rate: Seconds of the system in one of the clock; 0 is as fast as possible.
+        in_step: Whether each takes what the cycle before left, as in one process.
         kind: Of the executors; each level's process builds its own.
         block: Name of the shared memory.
         periods_ms: Of each process, by its name.
@@ -70,6 +72,16 @@ class Setting:
     block: str
     parent: int
     periods_ms: Mapping[str, int]
+    in_step: bool = False
+
+    def clocks(self, buffers: SharedMemoryBuffers) -> Clocks:
+        """Return the clocks of all processes, behind the buffers."""
+        return Clocks(buffers.block, buffers.layout.size, self.periods_ms, self.in_step)
+
+
+AT_FIRST = 0
+BEGINNINGS = {1: Begun.CHECKPOINT, 2: Begun.ANEW}
+"""How a level says that it began: with its initial state, or otherwise."""
 
 
 @dataclass(slots=True)
@@ -96,14 +108,13 @@ class Paced:
 
 
 def begin(level: RunningLevel, transport: SharedMemoryBuffers) -> None:
-    """Continue from the last committed cycle; where that is lost, or ended in a fault, start safely."""
-    held = transport.checkpoint(level.name)
-    if held is NotShared.BLANK:
-        return
-    if isinstance(held, NotShared) or level.sign.fault(held):
-        restart(level, transport)
-    else:
-        restart(level, transport, held)
+    """Continue from the last committed cycle; where that is lost, or ended in a fault, start safely. Say from what."""
+    held, how = transport.checkpoint(level.name), AT_FIRST
+    if held is not NotShared.BLANK:
+        good = None if isinstance(held, NotShared) or level.sign.fault(held) else held
+        begun = restart(level, transport, good).begun
+        how = next(number for number, each in BEGINNINGS.items() if each is begun)
+    transport.begin(level.name, how, level.values)
 
 
 def cycle(level: RunningLevel, transport: SharedMemoryBuffers) -> int:
@@ -116,22 +127,28 @@ def cycle(level: RunningLevel, transport: SharedMemoryBuffers) -> int:
 
 def serve_level(setting: Setting, name: str, told: "Connection") -> None:
     """Run a level's process, from its start to SIGTERM or a fault; send the reason of a refusal."""
-    with _telling(told), _attached(setting) as (signs, transport):
+    with telling(told), attached(setting) as (signs, transport):
         level = _level(setting, name, signs[name])
+        turn = Turn(setting.clocks(transport), name)
+        if (
+            transport.checkpoint_ms(name) >= turn.now_ms
+        ):  # it was killed between its commit and the end of its cycle
+            turn.done()
+        transport.now_ms = turn.now_ms
         begin(level, transport)
-        for _ in _rounds(setting, name, transport):
+        for _ in _rounds(setting, turn, transport):
             if cycle(level, transport):
                 raise SystemExit(FAULTY)
 
 
 def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connection") -> None:
     """Run a process for the parts outside the levels, until one of them says `over`."""
-    with _telling(told), _attached(setting) as (_, transport):
+    with telling(told), attached(setting) as (_, transport):
         parts: tuple[Outside, ...] = tuple(factory.make())
-        for tick in _rounds(setting, name, transport):
-            for part in parts:
-                for buffer, values in part.step(tick, transport.latest).items():
-                    _publish(transport, buffer, values)
+        for tick in _rounds(setting, Turn(setting.clocks(transport), name), transport):
+            given = [part.step(tick, transport.latest) for part in parts]
+            for buffer, values in ChainMap(*map(dict, reversed(given))).items():  # each once in a cycle
+                _publish(transport, buffer, values)
             if any(getattr(part, "over", False) for part in parts):
                 return
 
@@ -144,19 +161,21 @@ def _publish(transport: SharedMemoryBuffers, name: str, values: Values) -> None:
 
 
 @contextlib.contextmanager
-def _telling(told: "Connection") -> Iterator[None]:
-    """Send the reason why a level was refused a state or values, and end the process with `REFUSED`."""
+def telling(told: "Connection") -> Iterator[None]:
+    """Send the reason why a level was refused a state or values, or a log cannot be written; end the process with `REFUSED`."""
     try:
         yield
-    except StateTableError as error:
+    except (StateTableError, OSError) as error:
         told.send_bytes(str(error).encode()[:MOST_TOLD])
         raise SystemExit(REFUSED) from None
 
 
 @contextlib.contextmanager
-def _attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMemoryBuffers]]:
+def attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMemoryBuffers]]:
+    """Return the signatures of the levels, and the common memory."""
     signs = signatures(setting.description)
     buffers = SharedMemoryBuffers.attach(setting.block, layout(setting.description, signs))
+    buffers.in_step = setting.in_step
     try:
         yield signs, buffers
     finally:
@@ -165,16 +184,17 @@ def _attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMe
         buffers.close()
 
 
-def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterator[int]:
+def _rounds(setting: Setting, turn: Turn, buffers: SharedMemoryBuffers) -> Iterator[int]:
     """Yield a process's ticks, each when it is due and its turn has come, until SIGTERM or the end of its parent."""
     told: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
-    turn = Turn(Clocks(buffers.block, buffers.layout.size, setting.periods_ms), name)
-    pace, tick = Paced(setting.periods_ms[name] / 1000 / setting.rate if setting.rate else 0.0), 0
+    period_s = setting.periods_ms[turn.name] / 1000
+    pace, tick = Paced(period_s / setting.rate if setting.rate else 0.0), 0
     while not told and os.getppid() == setting.parent:
         turn.wait(told)
         if told:
             return
+        buffers.now_ms = turn.now_ms
         yield tick
         tick += 1
         turn.done()

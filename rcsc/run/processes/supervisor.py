@@ -31,12 +31,31 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
-PATIENCE_S, GRACE_S = 5.0, 0.5
+PATIENCE_S, GRACE_S, LOG_S = 5.0, 0.5, 60.0
+"""Seconds until who is told to end is killed: one process, all together, and the one that has a log to close."""
 MOST_RESTARTS = 20
 STILL_PERIODS, STILL_S = 25, 0.2
 """Periods, and seconds, without a commit after which a process is looked at."""
 LOOP_CPU_S, WAIT_S = 5.0, 10.0
 """Seconds without a commit: of computing for a process that loops, of waiting for one that hangs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What is wanted of a run of processes.
+
+    Attributes:
+        in_step: Whether each takes what the cycle before left, as in one process.
+        log: Where a diagnostic process records every cycle; None for no such process.
+        most: Ticks after which all stand; None for no such number.
+    """
+
+    in_step: bool = False
+    log: Path | None = None
+    most: int | None = None
+
+
+COURSE = Course()
 
 
 @dataclass(slots=True)
@@ -71,13 +90,26 @@ class Supervisor:
         *,
         queries: Factory | None = None,
         rate: float = 1.0,
+        course: Course = COURSE,
     ) -> None:
+        """Lay out the memory; nothing is begun yet.
+
+        Args:
+            description: Levels and wires.
+            kind: Of the executors.
+            outside: Factories of `Sequence[Outside]` by the name of their process.
+            queries: Makes the database's questions by name, in each level's process.
+            rate: Seconds of the system in one of the clock; 0 is as fast as possible.
+            course: What else is wanted of the run.
+        """
         self._signs = signatures(description)
         laid = layout(description, self._signs)
         self._outside = outside
         self._running: dict[str, SpawnProcess] = {}
         self._told: dict[str, Connection] = {}
         self._pulses: dict[str, _Pulse] = {}
+        self._recorder: _Recording | None = None
+        self._read_s = time.monotonic()
         periods_ms = dict.fromkeys(outside, description.tick_ms) | {
             name: sign.level_of(name).period_ms for name, sign in self._signs.items()
         }
@@ -86,10 +118,12 @@ class Supervisor:
             for name, period_ms in periods_ms.items()
         }
         self.buffers = SharedMemoryBuffers.create(laid, Clocks.size(len(periods_ms)))
-        self._clocks = Clocks(self.buffers.block, laid.size, periods_ms)
         self._setting = Setting(
-            description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms
+            description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms, course.in_step
         )
+        self._clocks, self._log = self._setting.clocks(self.buffers), course.log
+        if course.most is not None:
+            self._clocks.stop_at(course.most * description.tick_ms)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,6 +132,9 @@ class Supervisor:
 
     def __enter__(self) -> Self:
         try:
+            if self._log is not None:
+                self._recorder = _recording(self._setting, self._log)
+                self._clocks.record(on=True)
             for name in self.names:
                 self.start(name)
         except BaseException:
@@ -149,8 +186,44 @@ class Supervisor:
 
     @property
     def over(self) -> bool:
-        """True once a process outside the levels has ended well."""
-        return any(self.code(name) == 0 for name in self._outside)
+        """True once a process outside the levels has ended well, or all have run as many ticks as they are to."""
+        return any(self.code(name) == 0 for name in self._outside) or self._all_at(self._clocks.limit_ms)
+
+    def _all_at(self, limit_ms: int | None) -> bool:
+        """Whether no process has a cycle left before a time."""
+        clocks = (self._clocks.now_ms(name) for name in self._clocks.periods_ms)
+        return limit_ms is not None and all(now_ms is None or now_ms >= limit_ms for now_ms in clocks)
+
+    def note(self, name: str, what: str) -> None:
+        """Have the log say what became of a process."""
+        if self._recorder is not None:
+            with contextlib.suppress(OSError):  # it has ended, and `unrecorded` says so
+                self._recorder.tells.send((name, what, self._clocks.now_ms(name) or 0))
+
+    def unrecorded(self) -> str:
+        """Return the reason why nothing is recorded any more, once: nobody waits for the diagnostic process from then on."""
+        held, now_s = self._recorder, time.monotonic()
+        if held is None:
+            return ""
+        code, state = held.process.exitcode, _state(held.process.pid or 0)[0]
+        if state not in STOPPED | WAITING or not any(map(self._waits_for_log, self._clocks.periods_ms)):
+            self._read_s = now_s
+        if code is None and now_s - self._read_s < WAIT_S:
+            return ""
+        self._clocks.record(on=False)
+        self._recorder = None
+        why = "it ended" if code is not None else f"the others have waited {WAIT_S:g} s for it"
+        if code is not None and code < 0:
+            why = f"it was ended by {signal.Signals(-code).name}"
+        elif code == REFUSED and held.told.poll():
+            why = held.told.recv_bytes(MOST_TOLD).decode(errors="replace")
+        held.end(0.0)
+        return f"the diagnostic process records nothing more ({why}); the system goes on without it"
+
+    def _waits_for_log(self, name: str) -> bool:
+        """Whether a process waits for the diagnostic process, which has begun to read it."""
+        now_ms = self._clocks.now_ms(name)
+        return now_ms is not None and self._clocks.read_ms(name) > 0 and self._clocks.unread(name, now_ms)
 
     def check(self) -> None:
         """Check for processes that ended by themselves.
@@ -199,8 +272,10 @@ class Supervisor:
         return "waiting for something that does not come" if waits else ""
 
     def close(self) -> None:
-        """End all processes, and remove the shared memory."""
+        """End all processes, after the same cycle where a diagnostic process records them, and remove the shared memory."""
         with children.interrupts_held():
+            if self._recorder is not None:
+                self._end_together()
             for process in self._running.values():
                 process.terminate()
             until_s = time.monotonic() + GRACE_S
@@ -210,8 +285,35 @@ class Supervisor:
             self._running.clear()
             for told in self._told.values():
                 told.close()
+            if self._recorder is not None:
+                with contextlib.suppress(OSError):
+                    self._recorder.tells.send(self._clocks.limit_ms)
+                self._recorder.end(LOG_S)
             self.buffers.block.unlink()
             self.buffers.close()
+
+    def _end_together(self) -> None:
+        """Let every process run the cycles that another has begun, so that the log ends with a whole one."""
+        end_ms = self._clocks.common_end_ms()
+        if (limit_ms := self._clocks.limit_ms) is None or end_ms < limit_ms:
+            self._clocks.stop_at(end_ms)
+        seen, since_s, used_s = dict[str, tuple[int | None, int]](), time.monotonic(), dict[str, float]()
+        while not self._all_at(self._clocks.limit_ms) and not self.unrecorded():
+            for name in self._clocks.periods_ms:
+                if not self.runs(name) or self._clocks.left(name):
+                    self._clocks.leave(name)
+            states = {name: _state(self._running[name].pid or 0) for name in self._running if self.runs(name)}
+            now = {name: (self._clocks.now_ms(name), self._clocks.beats(name)) for name in states}
+            if now != seen:
+                seen, since_s = now, time.monotonic()
+                used_s = {name: cpu_s for name, (_, cpu_s) in states.items()}
+            patient = time.monotonic() - since_s < PATIENCE_S
+            if not patient and all(
+                state in STOPPED | WAITING or cpu_s - used_s[name] > LOOP_CPU_S
+                for name, (state, cpu_s) in states.items()
+            ):
+                return
+            time.sleep(0.001)
 
     def _message(self, name: str) -> str:
         values = self.buffers.checkpoint(name)
@@ -223,13 +325,51 @@ class Supervisor:
         return f"level `{name}`{table}: {sign.fault_seen(level, values)}"
 
 
-def run_processes(
+@dataclass(frozen=True, slots=True)
+class _Recording:
+    """The diagnostic process.
+
+    Attributes:
+        told: What it says.
+        tells: What is said to it.
+    """
+
+    process: "SpawnProcess"
+    told: "Connection"
+    tells: "Connection"
+
+    def end(self, seconds: float) -> None:
+        """Wait for its end, then kill it."""
+        _ended(self.process, time.monotonic() + seconds)
+        self.process.close()
+        self.told.close()
+        self.tells.close()
+
+
+def _recording(setting: Setting, log: Path) -> _Recording:
+    """Begin the diagnostic process."""
+    (told, theirs), (heard, tells) = children.pipe(), children.pipe()
+    process = children.process("diagnostics", _serve_diagnostics, setting, str(log), theirs, heard)
+    children.start(process)
+    theirs.close()
+    heard.close()
+    return _Recording(process, told, tells)
+
+
+def _serve_diagnostics(setting: Setting, path: str, told: "Connection", heard: "Connection") -> None:
+    from rcsc.run.processes.diagnose import serve_diagnostics  # needs an extra
+
+    serve_diagnostics(setting, path, told, heard)
+
+
+def run_processes(  # noqa: PLR0913  # as many as there are things to choose
     description: Description,
     kind: Kind,
     outside: Mapping[str, Factory],
     *,
     queries: Factory | None = None,
     rate: float = 1.0,
+    course: Course = COURSE,
     watch: Callable[[Supervisor], None] | None = None,
     told: Callable[[str], None] | None = None,
 ) -> None:
@@ -241,8 +381,9 @@ def run_processes(
         outside: Factories of `Sequence[Outside]` by the name of their process.
         queries: Makes the database's questions by name, in each level's process.
         rate: Seconds of the system in one of the clock; 0 is as fast as possible.
+        course: What else is wanted of the run.
         watch: Called some fifty times a second.
-        told: Called with what happened to a level that stood still; else it goes to the standard error stream.
+        told: Called with what happened to a level that stood still, or to the log; else it goes to the standard error stream.
 
     Raises:
         UnprovedExecutors: Executors are made of tables that are not proved.
@@ -253,13 +394,17 @@ def run_processes(
     refuse_unproved(description)
     restarts = 0
     say = told or _say
-    with _terminable(), Supervisor(description, kind, outside, queries=queries, rate=rate) as system:
+    supervisor = Supervisor(description, kind, outside, queries=queries, rate=rate, course=course)
+    with _terminable(), supervisor as system:
         while not system.over:
             system.check()
+            if why := system.unrecorded():
+                say(why)
             for name, why in system.still().items():
                 if name in outside:
                     raise ChildProcessError(f"process `{name}` stands still: {why}")
                 say(f"level `{name}` stood still ({why}); it is started again")
+                system.note(name, f"stood still: {why}")
                 system.stop(name, signal.SIGKILL)
             for name in system.killed():
                 if name in outside:
@@ -267,6 +412,7 @@ def run_processes(
                         f"process `{name}` was killed; what it did cannot be taken up again"
                     )
                 restarts += 1
+                system.note(name, f"ended by {signal.Signals(-(system.code(name) or 0)).name}")
                 if restarts > MOST_RESTARTS:
                     raise ChildProcessError(f"process `{name}` was killed; there were {restarts} of them")
                 system.start(name)

@@ -21,6 +21,7 @@ from rcsc.run.log.export import coverage
 from rcsc.run.log.export import plot as draw
 from rcsc.run.log.read import Log, LoggedLevel, read
 from rcsc.run.log.records import Seal
+from rcsc.run.log.schema import Gap
 from rcsc.run.log.states import begun_in_words, fault_in_words, witness_in_words
 from rcsc.views.pages.data import DrawnCell
 from rcsc.views.pages.finding_page import trace
@@ -157,7 +158,7 @@ def _summary(log: Log) -> None:
         click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")
     tables = coverage(log)
     for level in log.levels:
-        _summed(level)
+        _summed(log, level)
         for table in tables:
             if table.level == level.name:
                 ran = len(table.lines) - len(table.never)
@@ -166,16 +167,32 @@ def _summary(log: Log) -> None:
                 click.echo(f"    ran    {often or 'none'}")
                 if table.never:
                     click.echo(f"    never  {', '.join(table.never)}")
+    named = {level.name for level in log.levels}
+    for event in [event for event in log.events if event.process not in named][:SHOWN]:
+        click.echo(f"process {event.process}: {event.what}, before cycle {event.tick}")
 
 
-def _summed(level: LoggedLevel) -> None:
-    """Print how many cycles a level had, the last fault, and when the level was started again or set by hand."""
+def _summed(log: Log, level: LoggedLevel) -> None:
+    """Print how many cycles a level had, the last fault, when it was started again or set by hand, and what fell otherwise."""
     values = level.track.layout.unpack(level.track.packed[-1])
     said = (form(level.sign, level.level, values) for form in (fault_in_words, witness_in_words))
     fault = "; ".join(filter(None, said))
     click.echo(
         f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
     )
+    for event in [event for event in log.events if event.process == level.name][:SHOWN]:
+        click.echo(f"  {event.what}, before cycle {event.tick}")
+    for gap, why in ((Gap.NOT_RUN, "it did not run"), (Gap.UNSEEN, "what it left could not be read")):
+        ticks = [tick for tick, each in level.gaps.items() if each is gap]
+        if ticks:
+            click.echo(
+                f"  {_counted(len(ticks))}, the first {ticks[0]}, {'are' if ticks[1:] else 'is'} not here: {why}"
+            )
+    if level.taken is not None:
+        first = level.taken.ticks[0]
+        click.echo(
+            f"  {_counted(len(level.taken.ticks))}, the first {first}, took buffers of other cycles than in one process"
+        )
     for restart in level.restarts[:SHOWN]:
         begun = begun_in_words(restart.begun)
         if restart.by_hand:
@@ -184,6 +201,10 @@ def _summed(level: LoggedLevel) -> None:
         click.echo(f"  {told} before cycle {restart.tick}: {begun}")
     if len(level.restarts) > SHOWN:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
+
+
+def _counted(cycles: int) -> str:
+    return f"{cycles} cycle{'s' if cycles > 1 else ''}"
 
 
 def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:

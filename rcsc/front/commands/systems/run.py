@@ -27,10 +27,10 @@ from rcsc.run.orders.script import BadScript
 from rcsc.run.orders.stopped import NotKept, StoppedRuns
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.processes.serve import Factory
-from rcsc.run.processes.supervisor import Supervisor, run_processes
+from rcsc.run.processes.supervisor import Course, Supervisor, run_processes
 from rcsc.run.signature import Signature
 from rcsc.run.system import assemble, signatures
-from rcsc.views.pages.report import report
+from rcsc.views.pages.report import Figure, ReportRow, Story, report
 from rcsc.views.pages.witness import RunWitness
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class RunOptions:
         order: System, plant, script and database by name.
         rate: How many times as fast as the clock; None for as fast as it goes.
         most: Cycles at most; None where nobody says.
+        in_step: Whether processes run each cycle together, as one process does.
         again: What to type for the same run; how it begins is to be added.
     """
 
@@ -64,6 +65,7 @@ class RunOptions:
     most: int | None
     quiet: bool
     again: str
+    in_step: bool = False
 
 
 @click.command(
@@ -105,6 +107,8 @@ Examples:
 @COMPILES
 @click.option("--processes", is_flag=True,
               help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
+@click.option("--in-step", is_flag=True,
+              help="With --processes: none begins a cycle before all have run the last; the log is that of one process.")  # fmt: skip
 @click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=None, metavar="N",
               help=f"Times as fast as the clock; else as fast as it goes, with --processes or --live {WATCHED_RATE:g}.")  # fmt: skip
 @click.option("--from-row", type=click.IntRange(min=1), default=None, metavar="N",
@@ -115,7 +119,7 @@ Examples:
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str,
     database: Path | None, seed: int, faults: tuple[str, ...], cycles: int | None, log: Path | None, report: Path | None, live: bool,
-    compiles: bool, processes: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
+    compiles: bool, processes: bool, in_step: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Run SYSTEM with its plant and its script, or SCRIPT in the system that is here.
 
@@ -124,10 +128,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     after the other, and what became of each is printed. A row that fails stops the script with its reason; the level is told
     to rest.
     """
-    if processes and (resumes or live or report or cycles or log):
-        raise click.UsageError(
-            "--resume, --live, --report, --log and --cycles are of one process; with --processes, use --from-row"
-        )
+    if processes and (resumes or live):
+        raise click.UsageError("--resume and --live are of one process; with --processes, use --from-row")
+    if in_step and not processes:
+        raise click.UsageError("--in-step is of --processes: one process does nothing else")
     if live and (resumes or from_row or report or cycles or log):
         raise click.UsageError(
             "--resume, --from-row, --report, --log and --cycles are of a run that no page leads; leave --live out"
@@ -156,7 +160,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paced = rate or (WATCHED_RATE if processes else None)
     again = _command(target, system, script, database, executor, plant)
     title = named or described.name
-    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again)
+    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again, in_step)
     try:
         return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
     except ChildProcessError as error:
@@ -257,18 +261,32 @@ def _recorded(run: ScriptedRun, asked: RunOptions, ending: Ending) -> Iterator[P
         Recorder,  # of an extra; a plant that needs a larger one has said so by now
     )
 
-    system = run.system.description
-    path = asked.log or system.database.parent / ".rcsc-cache" / f"{system.name}.mcap"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    path = _log_path(asked, run.system.description)
+    with _writable(path):
         recorder = Recorder(run.system, path)
-    except OSError as error:
-        raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
     run.system.watch.append(ending.whole(recorder))
     try:
         yield path
     finally:
         recorder.close()
+
+
+def _log_path(asked: RunOptions, system: Description) -> Path:
+    return asked.log or system.database.parent / ".rcsc-cache" / f"{system.name}.mcap"
+
+
+@contextlib.contextmanager
+def _writable(log: Path) -> Iterator[None]:
+    """Begin a log inside, in a folder that is there then.
+
+    Raises:
+        BadDescription: It cannot be written.
+    """
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except OSError as error:
+        raise BadDescription(f"the log {log} cannot be written: {error.strerror}") from error
 
 
 class _Pace:
@@ -309,10 +327,18 @@ def _say(number: int, text: str, state: str, reason: str, ticks: int) -> None:
 
 def _apart(asked: RunOptions, from_row: int | None) -> int:
     """Run the system with a process for each level."""
+    from rcsc.run.log.recorder import Recorder  # noqa: F401  # of an extra: told before a process is begun
+
     system = description(asked.path)
     rows = _checked_apart(asked, system, signatures(system), from_row)
+    log = _log_path(asked, system)
+    with _writable(log):
+        if log.is_file() or not log.exists():
+            log.open("ab").close()
+    begun = time.perf_counter()
     with scratch("run") as folder:
-        ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results")
+        ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results", log)
+    _recorded_apart(asked, system, ends, log, time.perf_counter() - begun)
     if ends and ends[-1][2] != "done":
         number, text, state, reason, _ = ends[-1]
         raise Stopped(
@@ -321,8 +347,33 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
             f"mend the cause, then begin anew: {asked.again} --processes --from-row {number}",
         )
     if rows > len(ends) + (from_row or 1) - 1:
-        raise Stopped(Code.SCRIPT_STOPPED, f"the plant ended the run in row {len(ends) + (from_row or 1)}")
+        row = len(ends) + (from_row or 1)
+        why = f"the plant ended the run in row {row}"
+        if asked.most is not None:
+            why = f"row {row} did not end in {asked.most} cycles"
+        raise Stopped(Code.SCRIPT_STOPPED, why)
     return 0
+
+
+def _recorded_apart(
+    asked: RunOptions, system: Description, ends: list[list[Any]], log: Path, seconds: float
+) -> None:
+    """Make the report of a run in processes from its log, and say where they are."""
+    if asked.report is not None:
+        from rcsc.desk.studio.share.film import with_ticks
+        from rcsc.run.log.read import read
+        from rcsc.views.pages.log_page import drawn_first, matched
+
+        whole = read(log)
+        rows = [ReportRow(number, text, state, ticks, reason) for number, text, state, reason, ticks in ends]
+        timing = [Figure("by the clock", seconds, "s")]
+        story = Story(
+            asked.title, rows, matched=matched(whole), timing=timing, tick_ms=system.tick_ms,
+            ticks=len(whole.ticks),
+        )  # fmt: skip
+        _report(asked.report, with_ticks(story, whole, drawn_first(whole, system.displays)))
+    if not asked.quiet:
+        click.echo(_files(asked, log))
 
 
 def _checked_apart(
@@ -330,16 +381,20 @@ def _checked_apart(
 ) -> int:
     """Return the number of rows; report errors of plant and script before a process is begun."""
     stage: Staged = staged(asked.order, system, signs)
+    if stage.operator is None and asked.most is not None:
+        return 0
     if stage.operator is None:
         raise Stopped(
             Code.BAD_SCRIPT,
             "processes run until a script ends, and none is named",
-            "`--script FILE` names one",
+            "`--script FILE` names one, `--cycles N` ends them after so many cycles",
         )
     return _check_row(stage.operator, from_row)
 
 
-def _rows_apart(asked: RunOptions, system: Description, first: int, results: Path) -> list[list[Any]]:
+def _rows_apart(
+    asked: RunOptions, system: Description, first: int, results: Path, log: Path
+) -> list[list[Any]]:
     """Run the processes to the end; return each row's number, text, state, reason and ticks, which travel through `results`."""
     outside = Factory("rcsc.run.plant.staging:outside", (asked.order, str(results), first))
     queries = Factory("rcsc.run.plant.staging:queries", (asked.order,))
@@ -355,7 +410,10 @@ def _rows_apart(asked: RunOptions, system: Description, first: int, results: Pat
         rows.extend(new)
 
     results.touch()
-    run_processes(system, asked.kind, {"outside": outside}, queries=queries, rate=rate, watch=show)
+    run_processes(
+        system, asked.kind, {"outside": outside}, queries=queries, rate=rate,
+        course=Course(asked.in_step, log, asked.most), watch=show,
+    )  # fmt: skip
     show()
     return rows
 
@@ -371,10 +429,19 @@ def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions,
     whole = read(log)
     story = replace(witness.story(asked.title, seconds), matched=matched(whole))
     drawn = witness.drawn or drawn_first(whole, witness.run.system.description.displays)
+    _report(path, with_ticks(story, whole, drawn))
+
+
+def _report(path: Path, story: Story) -> None:
     try:
-        report(path, with_ticks(story, whole, drawn))
+        report(path, story)
     except OSError as error:
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
+
+
+def _files(asked: RunOptions, log: Path) -> str:
+    here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
+    return f"log: {here}" + (f"; report: {asked.report}" if asked.report else "")
 
 
 def _closing(
@@ -385,8 +452,7 @@ def _closing(
     if not asked.quiet:
         for line in (*witness.closing(), *_unconnected(run), _figures(run, seconds)):
             click.echo(line)
-        here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
-        click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
+        click.echo(_files(asked, log))
     operator = run.operator
     if operator is None:
         return 0
