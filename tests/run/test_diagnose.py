@@ -1,27 +1,38 @@
-"""The diagnostic process: every cycle of every level is in its log, whatever became of levels, and what is not there is said."""
+"""A system in processes, looked at: every cycle is in its log, and what is not there is said; who attaches steps, sets and leaves it."""
 
 import os
 import signal
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
+from rcsc.base.diagnostics.coded import Refused
+from rcsc.base.host.files.read import CheckedFields
+from rcsc.desk.shell.opening import Opening, opened
+from rcsc.desk.studio.hub import Ask
+from rcsc.desk.studio.runs.live import Live, Pace
+from rcsc.front.commands import run
 from rcsc.run.adopt import Begun
+from rcsc.run.description import description
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.replay import Replay
 from rcsc.run.log.schema import Gap, LoggedEvent, event_of
+from rcsc.run.plant.staging import StageOrder
 from rcsc.run.processes import serve
+from rcsc.run.processes.attach import NotAttached, RunningSystem, attach, find, running
 from rcsc.run.processes.clocks import Clocks, Turn
 from rcsc.run.processes.diagnose import Watch
 from rcsc.run.processes.memory import SharedMemoryBuffers, layout
-from rcsc.run.processes.serve import Setting, begin, cycle
+from rcsc.run.processes.serve import Factory, Setting, begin, cycle
 from rcsc.run.processes.supervisor import Course, Supervisor, run_processes
 from rcsc.run.system import assemble, signatures
 from tests.support.processes_outside import ACQUIRE, QUERIES, ROUND, alone, outside, queries
 
+PATIENCE_S = 600.0
 PERIODS = {"task": 40, "below": 40}
 RECORDED = (
     "the diagnostic process records nothing more (it was ended by SIGKILL); the system goes on without it"
@@ -229,3 +240,143 @@ def test_the_system_goes_on_without_its_diagnostic_process(repo: Path, tmp_path:
     )  # fmt: skip
     assert told == [RECORDED]
     assert not read(path).complete
+
+
+# --- attached ---
+
+
+@pytest.fixture
+def system(dock: Path, tmp_path: Path) -> Iterator[Supervisor]:
+    """The docking robot in processes, of which nobody orders anything; its log is `run.mcap`."""
+    (dock / "long.csv").write_text("command,cycles\n,90000\n", encoding="utf-8")
+    path = dock / "system.toml"
+    outside = Factory(
+        "rcsc.run.plant.staging:outside", (StageOrder(str(path), script="long"), str(tmp_path / "rows"))
+    )
+    course = Course(log=tmp_path / "run.mcap", system=path)
+    with Supervisor(description(path), "python", {"outside": outside}, rate=4.0, course=course) as made:
+        until(lambda: (made._clocks.now_ms("drive") or 0) > 80, "it does not run")
+        yield made
+
+
+def until(holds: Callable[[], bool], what: str) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not holds():
+        assert time.monotonic() < end, what
+        time.sleep(0.002)
+
+
+def goes_on(system: Supervisor) -> None:
+    """All processes run cycles."""
+    for name in system._clocks.periods_ms:
+        before = system._clocks.now_ms(name) or 0
+        until(lambda: (system._clocks.now_ms(name) or 0) > before + 80, f"{name} stands")  # noqa: B023  # called here
+
+
+def test_a_running_system_is_stepped_set_held_and_let_go(
+    system: Supervisor, dock: Path, tmp_path: Path
+) -> None:
+    found = find(system.buffers.block.name)
+    assert (found.name, found.system, found in running()) == ("dock", (dock / "system.toml").resolve(), True)
+    commands = opened(Opening(found.system, attached=found))
+    session, here = commands.session, commands.session.attached
+    assert here is not None
+    with pytest.raises(NotAttached, match="somebody else is attached"):
+        attach(found, "python", {})
+    first = here.tick
+    commands.do("step 3")
+    assert here.tick == first + 3
+    assert set(map(system._clocks.now_ms, system._clocks.periods_ms)) == {40 * here.tick}, "all stand"
+    # what is set is what the level goes on from, and nobody else is told
+    commands.do("drive.waited = 7")
+    set_at = here.tick + 1
+    commands.do("step")
+    # one level held, the rest goes on
+    commands.do("hold drive")
+    before = session.system.level("drive").values
+    commands.do("step 2")
+    assert session.system.level("drive").values == before
+    skipped = {here.tick, here.tick - 1}
+    commands.do("step drive")
+    ran_at = here.tick
+    assert "goes on" in commands.do("release drive")[0]
+    for refused in ("undo", "restart drive", "freeze drive.report", "reload drive", "step drive"):
+        with pytest.raises(Refused):
+            commands.do(refused)
+    commands.do("step")
+    session.leave()
+    goes_on(system)
+    system.close()
+    log = read(tmp_path / "run.mcap")
+    drive = log.level("drive")
+    assert log.complete
+    assert {tick: gap for tick, gap in drive.gaps.items() if tick <= ran_at} == dict.fromkeys(
+        skipped, Gap.NOT_RUN
+    )
+    assert ran_at in drive.track.ticks
+    assert [(one.tick, one.begun) for one in drive.restarts] == [(set_at, Begun.HAND)]
+    assert drive.set_by_hand(drive.restarts[0]) == {"waited": "7"}
+    assert [event.what for event in log.events] == []
+    assert Replay(log, dock / "generated", "python").first_difference() is None
+
+
+def test_the_studio_lets_it_run_pauses_it_and_lets_it_go(system: Supervisor) -> None:
+    work: list[Callable[[], None]] = []
+    opening = Opening(find(system.buffers.block.name).system, attached=find(system.buffers.block.name))
+    live = Live(opening, lambda *_: None, lambda do, _: work.append(do), Pace(None, runs=True))
+    live.open()
+    assert live.state()["going"]
+    first = live.state()["tick"]
+    while live.state()["tick"] < first + 5:
+        work.pop(0)()
+    assert live.history.last == live.state()["tick"]
+    live._on_pause(Ask(CheckedFields({}), lambda _: None, lambda _: None))
+    stands = {name: system._clocks.now_ms(name) for name in system._clocks.periods_ms}
+    assert set(stands.values()) == {40 * live.state()["tick"]}
+    live.close()
+    goes_on(system)
+
+
+def test_who_dies_attached_leaves_the_system_running(system: Supervisor, tmp_path: Path) -> None:
+    here = attach(find(system.buffers.block.name), "python", {})
+    here.hold("drive", on=True)
+    stands = {name: system._clocks.now_ms(name) for name in system._clocks.periods_ms}
+    system.let_go()
+    assert stands == {name: system._clocks.now_ms(name) for name in stands}, "it lives"
+    os.close(here.link.lock)  # as the kernel does
+    here.link.memory.close()
+    system.let_go()
+    assert not system._clocks.held("drive")
+    goes_on(system)
+    system.close()
+    events = [event.what for event in read(tmp_path / "run.mcap").events]
+    assert events == ["somebody is attached", "nobody is attached any more"]
+
+
+def test_a_system_that_has_ended_says_so(system: Supervisor) -> None:
+    here = attach(find(system.buffers.block.name), "python", {})
+    system.close()
+    try:
+        here.step()  # the last cycle, which all end with
+        with pytest.raises(NotAttached, match="`dock` has ended"):
+            here.step()
+    finally:
+        here.leave()
+
+
+def test_what_does_not_run_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("rcsc.run.processes.attach.FOLDER", tmp_path)
+    (tmp_path / "rcsc-1-x").write_bytes(b"\0" * 9000)
+    assert run(["shell", "--attach"]) == 1
+    assert "error[RCS728]: no system runs in processes here" in capsys.readouterr().err
+    for block in ("rcsc-1-a", "rcsc-1-b"):
+        note = RunningSystem("", "dock", tmp_path, ("outside",), {}, 1.0, in_step=False)
+        (tmp_path / block).write_bytes(b"\0" * 64 + note.text())
+    assert [each.block for each in running()] == ["rcsc-1-a", "rcsc-1-b"]
+    assert run(["shell", "--attach", "dock"]) == 1
+    assert "2 such systems run: `rcsc-1-a` (dock), `rcsc-1-b` (dock)" in capsys.readouterr().err
+    assert run(["studio", "--attach", "dick"]) == 1
+    assert "no system `dick` runs" in capsys.readouterr().err
+    assert run(["studio", "--attach", "dock", "--alone"]) == 2

@@ -153,13 +153,14 @@ def test_each_level_in_a_process_does_the_same(capsys: pytest.CaptureFixture[str
     assert run([*quick, "one.mcap"]) == 0
     rows = [line for line in capsys.readouterr().out.splitlines() if " done " in line]
     assert run([*quick, "step.mcap", "--processes", "--in-step", "--rate", "20"]) == 0
-    first, *lines, last = capsys.readouterr().out.splitlines()
+    first, second, *lines, last = capsys.readouterr().out.splitlines()
     assert first == "each level in a process of its own, 20 times as fast as the clock"
+    assert "rcsc studio --attach dock" in second
     assert (lines, last) == (rows, "log: step.mcap; report: run.html")
     assert Path("step.mcap").read_bytes() == Path("one.mcap").read_bytes()
     assert "undock" in Path("run.html").read_text(encoding="utf-8")
     assert run([*quick[:-3], "--processes", "--rate", "20", "--log", "free.mcap"]) == 0
-    lines = capsys.readouterr().out.splitlines()[1:-1]
+    lines = capsys.readouterr().out.splitlines()[2:-1]
     assert [line.split()[1:3] for line in lines] == [["dock", "done"], ["stop", "done"], ["undock", "done"]]
     assert run(["replay", "free.mcap", "--system", "dock", "--executor", "python"]) == 0
     assert "nothing differs" in capsys.readouterr().out

@@ -1679,6 +1679,9 @@ class Code(StrEnum):
     of its periods because it was stopped by a signal, loops or waits, is started again and goes on from its last cycle. Too many of
     them were, or the process of workstation and plant was, which cannot be taken up again; or one ended by an exception,
     which stands on the standard error stream. The message names the process. Everything was ended, and nothing is left of it.
+
+    Likewise where `--attach` finds no such system, one that has ended, one to which somebody else is attached, or one that runs other
+    tables than those that are compiled; nothing was changed.
     """
     BAD_PLANT = """RCS729: the plant does not fit
 

@@ -58,6 +58,9 @@ order [LEVEL] COMMAND [FIELD=VALUE ...]
 faults                  the plant's faults, and which somebody switched on
 fault NAME [off]        switch one on, or off; NAME=STRENGTH where it has strengths: fault late_ticks=120
 restart LEVEL [anew]    start a level again, as if its process had been killed: as its last cycle left it, or anew
+hold LEVEL, release LEVEL
+                        of a system in processes: the level skips its cycles but for those of `step LEVEL`, the rest goes on;
+                        it takes part again
 freeze BUFFER, thaw BUFFER
                         what is written to a buffer gets lost, or arrives again
 undo [N]                go back to before the last cycle, or the last N
@@ -134,7 +137,8 @@ class Commands:
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
             "diff": self._diff,
             "expect": self._expect, "fault": self._fault, "faults": self._faults,
-            "freeze": self._freeze, "help": self._help, "level": self._level, "levels": self._levels, "order": self._order,
+            "freeze": self._freeze, "help": self._help, "hold": self._hold,
+            "release": self._release, "level": self._level, "levels": self._levels, "order": self._order,
             "lines": self._lines, "log": self._log, "quit": self._quit, "reload": self._reload, "restart": self._restart, "run": self._run,
             "names": self._names,
             "show": self._show, "step": self._step, "thaw": self._thaw, "undo": self._undo,
@@ -412,6 +416,12 @@ class Commands:
         if how.strip() not in {"", "anew"}:
             raise Refused(Code.SHELL_COMMAND, f"`{how.strip()}` is not `anew`")
         return [self.session.restart(self._named(name), anew=bool(how.strip()))]
+
+    def _hold(self, rest: str) -> Output:
+        return [self.session.hold(self._named(rest), on=True)]
+
+    def _release(self, rest: str) -> Output:
+        return [self.session.hold(self._named(rest), on=False)]
 
     def _freeze(self, rest: str) -> Output:
         return [self.session.freeze(rest, on=True)]

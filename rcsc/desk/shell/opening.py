@@ -14,6 +14,7 @@ from rcsc.run.description import NO_DATA, BadDescription, Description, descripti
 from rcsc.run.plant.load import by_hand
 from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
+from rcsc.run.processes.attach import RunningSystem, attach
 from rcsc.run.signature import Signature
 from rcsc.run.system import Kind, assemble, signatures
 
@@ -32,6 +33,7 @@ class Opening:
         database: A database to be used as it is; empty for the system's own.
         faults: Of the plant, on from the first cycle.
         ordered: Whether the script that the description names gives the orders where `script` names none, as in `rcsc run`.
+        attached: What runs already, in processes of its own; None where it is put together here.
     """
 
     path: Path
@@ -43,6 +45,7 @@ class Opening:
     database: str = ""
     faults: tuple[str, ...] = ()
     ordered: bool = False
+    attached: RunningSystem | None = None
 
 
 def opened(wanted: Opening) -> Commands:
@@ -53,6 +56,10 @@ def opened(wanted: Opening) -> Commands:
     """
     system = description(wanted.path)
     signs = signatures(system)
+    if wanted.attached is not None:
+        queries = silent_queries(system, signs)
+        elsewhere = attach(wanted.attached, wanted.kind, queries)
+        return Commands(Session(elsewhere, Origin(wanted.path, system, wanted.kind, queries)))
     wanted = replace(wanted, script=_script(system, wanted))
     stage = Staged() if wanted.alone else _stage(system, signs, wanted)
     queries = silent_queries(system, signs) | dict(stage.queries)

@@ -31,6 +31,7 @@ from rcsc.run.log.schema import fingerprints
 from rcsc.run.log.states import begun_in_words
 from rcsc.run.orders.operator import line_to
 from rcsc.run.orders.roles import Served, served
+from rcsc.run.processes.attach import AttachedSystem
 from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 
@@ -52,10 +53,12 @@ class Session:
         faults: Of the plants, that are on by hand.
         changes: How often something was done that `undo` takes back, and was not taken back.
         between: Called between two cycles of `run`: what is typed while it runs is done there.
+        attached: The same system where it runs in other processes; None where it runs here.
     """
 
     def __init__(self, system: System, plant: Origin) -> None:
         self.system, self.plant = system, plant
+        self.attached = system if isinstance(system, AttachedSystem) else None
         buffers = {wire.source: system.buffers.latest(wire.source) for wire in system.description.wires}
         self.memory = history.Memory({name: held for name, held in buffers.items() if held is not None})
         system.buffers = self.memory
@@ -135,12 +138,44 @@ class Session:
         except StateTableError as error:
             raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
 
+    def _here(self, what: str) -> None:
+        """Raises: Refused: The system runs in other processes, where nobody does that."""
+        if self.attached is not None:
+            raise Refused(Code.SHELL_COMMAND, f"what runs in processes of its own is not {what} from here")
+
+    def hold(self, name: str, *, on: bool) -> str:
+        """Have a level skip its cycles while the rest of an attached system goes on, or no more.
+
+        Raises:
+            Refused: The system runs here.
+        """
+        if self.attached is None:
+            message = "a level is held in a system that runs in processes"
+            raise Refused(
+                Code.SHELL_COMMAND, message, "`rcsc run --processes`, and attach to it; here `step LEVEL`"
+            )
+        self.attached.hold(name, on=on)
+        return (
+            f"level `{name}` {'skips its cycles' if on else 'goes on'} from cycle {self.system.tick + 1} on"
+        )
+
     def cycle_alone(self, level: RunningLevel) -> None:
         """One cycle of one level: it takes its buffers as they are, runs, and gives.
 
         Raises:
             Refused: It was refused an input, no line or several matched, or an extern procedure failed.
         """
+        if self.attached is not None:
+            if not self.attached.held(level.name):
+                message = f"level `{level.name}` runs with the others"
+                raise Refused(
+                    Code.SHELL_COMMAND,
+                    message,
+                    f"`hold {level.name}` first, then it runs the cycles that you step",
+                )
+            self.attached.allow(level.name)
+            self.cycle()
+            return
         _fit(level)
         self._keep()
         try:
@@ -226,6 +261,7 @@ class Session:
         Raises:
             Refused: Its tables are not proved for that state.
         """
+        self._here("started again")
         level = self.system.level(name)
         checkpoint = None if anew else level.values
         self._keep()
@@ -256,6 +292,7 @@ class Session:
         Raises:
             Refused: There is no such buffer.
         """
+        self._here("frozen, buffer by buffer,")
         known = [wire.source for wire in self.system.description.wires]
         if buffer not in known:
             raise Refused(Code.SHELL_NAME, f"there is no buffer `{buffer}`", *nearest(buffer, known))
@@ -270,6 +307,7 @@ class Session:
             Refused: So many are not kept.
         """
         self._not_logged("undone")
+        self._here("undone")
         if count > len(self._past):
             raise Refused(Code.SHELL_COMMAND, f"only {len(self._past)} cycles can be undone")
         moment = self._past[-count]
@@ -440,6 +478,11 @@ class Session:
             raise Refused(Code.SHELL_COMMAND, f"the log ends here: {error.strerror}") from error
         return True
 
+    def leave(self) -> None:
+        """Let a system that runs in other processes go on without this one."""
+        if self.attached is not None:
+            self.attached.leave()
+
     def _record(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
         """Raises: Refused: The cycle cannot be written; it was done, and no more is written."""
         assert self._log is not None  # only while one is written
@@ -469,6 +512,7 @@ class Session:
             Refused: They are not taken; the old ones run on.
         """
         self._not_logged("changed")
+        self._here("given other tables")
         old, reloaded, judged = self._try_reload(name, prove=prove)
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]

@@ -1,6 +1,6 @@
 """Keep the processes of a system together: none runs far ahead of another, nor of who records them.
 
-In: a block, and the period of each process. Out: `Clocks`, three words of the block for each process, and `Turn`, with which a
+In: a block, and the period of each process. Out: `Clocks`, some words of the block for each process, and `Turn`, with which a
 process waits for the others.
 
 In one process each level sees what the others gave in the cycle before, and tables count cycles: of how long an answer may take,
@@ -19,6 +19,9 @@ not move for `MOST_WAIT_S` is not waited for until it moves, unless all are in s
 A diagnostic process says of each process up to which time it has read what that committed. A process begins a cycle only when all but
 its last have been read. It writes over the last but one, so that whatever the machine does no cycle is lost to the record. A
 diagnostic process that ends is waited for no more: the supervisor says so.
+
+Who is attached takes part as well: all stand before the time up to which it lets them go. A level that it *holds* skips its cycles, but
+for those that it allows, while its clock and the others go on. When it goes, or dies, everything is let go (`attach`, `supervisor`).
 """
 
 import time
@@ -28,8 +31,9 @@ from dataclasses import dataclass, field
 from rcsc.run.processes.block import Block
 
 WORD = 8
-WORDS = 3
-"""Of each process: the time of its next cycle, its beats, and up to when it was read."""
+HEAD, WORDS = 4, 6
+"""Words of all: whether they are recorded, the end, up to when who is attached lets them go, and who that is. Of each process: the
+time of its next cycle, its beats, up to when it was read, whether it is held, how many cycles it was allowed meanwhile and has had."""
 ABSENT = 0
 """Instead of a time, which is kept one higher: the process has never been started, or there is no such limit."""
 MOST_WAIT_S = 60.0
@@ -55,13 +59,13 @@ class Clocks:
 
     def __post_init__(self) -> None:
         """Give each process its place."""
-        places = {name: self.first + (2 + WORDS * at) * WORD for at, name in enumerate(self.periods_ms)}
+        places = {name: self.first + (HEAD + WORDS * at) * WORD for at, name in enumerate(self.periods_ms)}
         self._places.update(places)
 
     @staticmethod
     def size(processes: int) -> int:
         """Return the number of bytes that the clocks of so many processes take."""
-        return (2 + WORDS * processes) * WORD
+        return (HEAD + WORDS * processes) * WORD
 
     def start(self, name: str) -> None:
         """Make the others wait for a process from now on; one that ran before goes on where it stood."""
@@ -107,6 +111,50 @@ class Clocks:
         """Tell whether a cycle of then would overwrite what the diagnostic process has not read."""
         return bool(self.block.word(self.first)) and self.read_ms(name) < now_ms - self.periods_ms[name]
 
+    # --- who is attached ---
+
+    @property
+    def attached(self) -> int:
+        """The number of the process that is attached; 0 for none."""
+        return self.block.word(self.first + 3 * WORD)
+
+    def attach(self, process: int) -> None:
+        """Say who is attached."""
+        self.block.set_word(self.first + 3 * WORD, process)
+
+    def let_until(self, now_ms: int) -> None:
+        """Let all run their cycles before a time, and none of then or later."""
+        self.block.set_word(self.first + 2 * WORD, now_ms + 1)
+
+    def hold(self, name: str, *, on: bool) -> None:
+        """Have a process skip its cycles, or no more."""
+        self.block.set_word(self._places[name] + 3 * WORD, int(on))
+
+    def held(self, name: str) -> bool:
+        """Tell whether a process skips its cycles."""
+        return bool(self.block.word(self._places[name] + 3 * WORD))
+
+    def allow(self, name: str, cycles: int) -> None:
+        """Allow a process that is held some cycles more."""
+        at = self._places[name] + 4 * WORD
+        self.block.set_word(at, self.block.word(at) + cycles)
+
+    def skips(self, name: str) -> bool:
+        """Tell whether a process skips the cycle whose turn it is; one that it is allowed it has had by that."""
+        allowed, had = (self.block.word(self._places[name] + word * WORD) for word in (4, 5))
+        if not self.held(name):
+            self.block.set_word(self._places[name] + 5 * WORD, allowed)
+            return False
+        self.block.set_word(self._places[name] + 5 * WORD, min(had + 1, allowed))
+        return had >= allowed
+
+    def let_go(self) -> None:
+        """Let all go on: nobody is attached any more."""
+        for name in self.periods_ms:
+            self.hold(name, on=False)
+        self.block.set_word(self.first + 2 * WORD, ABSENT)
+        self.attach(0)
+
     # --- the end ---
 
     @property
@@ -114,9 +162,19 @@ class Clocks:
         """The time before which the last cycles begin; None for none."""
         return self._time(self.first + WORD)
 
+    @property
+    def limits_ms(self) -> tuple[int | None, ...]:
+        """The times before which cycles may begin: of all, and while somebody is attached."""
+        return self.limit_ms, self._time(self.first + 2 * WORD) if self.attached else None
+
     def stop_at(self, limit_ms: int) -> None:
         """Have all run their cycles before a time, and none of then or later."""
         self.block.set_word(self.first + WORD, limit_ms + 1)
+
+    def all_at(self, limit_ms: int) -> bool:
+        """Tell whether no process has a cycle left before a time."""
+        clocks = (self.now_ms(name) for name in self.periods_ms)
+        return all(now_ms is None or now_ms >= limit_ms for now_ms in clocks)
 
     def common_end_ms(self) -> int:
         """Return the earliest time before which all cycles lie that may have begun."""
@@ -141,7 +199,7 @@ class Clocks:
         return behind
 
     def latest_ms(self, name: str) -> int:
-        """Return the time of the latest cycle that another process has run."""
+        """Return the time of the latest cycle that a process but this one has run."""
         clocks = ((other, self.now_ms(other)) for other in self.periods_ms if other != name)
         return max(
             (now_ms - self.periods_ms[other] for other, now_ms in clocks if now_ms is not None), default=0
@@ -188,10 +246,10 @@ class Turn:
 
     def _halted(self) -> bool:
         """Whether a cycle now would be one too many, or overwrite what is still to be recorded."""
-        limit_ms = self.clocks.limit_ms
-        return (limit_ms is not None and self.now_ms >= limit_ms) or self.clocks.unread(
-            self.name, self.now_ms
-        )
+        now_ms = self.now_ms
+        return any(
+            limit_ms is not None and now_ms >= limit_ms for limit_ms in self.clocks.limits_ms
+        ) or self.clocks.unread(self.name, self.now_ms)
 
     def _behind(self) -> dict[str, int]:
         """Return the clocks of the processes that this one has to wait for."""

@@ -46,7 +46,7 @@ from rcsc.run.processes.memory import (
     SharedMemoryBuffers,
     begun,
 )
-from rcsc.run.processes.serve import BEGINNINGS, Setting, attached, telling
+from rcsc.run.processes.serve import BEGINNINGS, REFUSES, Setting, attached, telling
 from rcsc.run.signature import Signature, Values
 
 if TYPE_CHECKING:
@@ -200,6 +200,8 @@ class Watch:
         for name, region in self._begun.items():
             for image in region.until(now_ms):
                 how, values = self._beginning(name, image)
+                if how == REFUSES:
+                    self.note(name, "refused what was set by hand: no cycle may begin with it", now_ms)
                 if how in BEGINNINGS:
                     leaves = next(len(level.sign.leaves) for level in self.levels if level.name == name)
                     self.restarts.append(Restarted(name, BEGINNINGS[how], values[:leaves]))

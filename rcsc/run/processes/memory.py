@@ -12,7 +12,8 @@ starts with its own stamp, 0 while it is being written, and carries a checksum; 
 stamp changed, and tries again. What does not agree with its checksum is never believed.
 
 A slot says in which cycle it was written, by the system's own time, and a level's with which cycles' buffers it ran: who reads both
-slots before the next but one is written (`clocks`) has missed none. A second region of a level says from what it began.
+slots before the next but one is written (`clocks`) has missed none. A second region of a level says from what it began, a third what
+somebody sets by hand: the level takes it between two cycles, and nobody writes in what is its own.
 
 One process writes a region; a level is not started twice.
 """
@@ -20,14 +21,14 @@ One process writes a region; a level is not started twice.
 import struct
 import time
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Self
 
 from rcsc.run.description import BadDescription, Description
 from rcsc.run.processes.block import Block
-from rcsc.run.signature import FORMATS, Signature, Values
+from rcsc.run.signature import FORMATS, Signature, Value, Values
 
 HEAD = struct.Struct("<QQQII")  # stamp, which buffers are there, time of the cycle, checksum, nothing
 TICK, BEGUN = "Q", "B"
@@ -130,6 +131,9 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
     payloads = {
         name: struct.Struct(signs[name].packed.format + TICK * len(taken)) for name, taken in takes.items()
     }
+    payloads |= {
+        mail(name): struct.Struct(f"{signs[name].packed.format}{_marks(signs[name])}s") for name in takes
+    }
     payloads |= {begun(name): struct.Struct(f"<{BEGUN}{signs[name].packed.format[1:]}") for name in takes}
     places: dict[str, BufferPlace] = {}
     for wire in system.wires:
@@ -158,6 +162,16 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
 def begun(level: str) -> str:
     """Return the name of the region in which a level says from what it began."""
     return f"{level}/begun"
+
+
+def mail(level: str) -> str:
+    """Return the name of the region in which somebody sets variables of a level."""
+    return f"{level}/mail"
+
+
+def _marks(sign: Signature) -> int:
+    """Return the bytes with a bit for each leaf."""
+    return -(-len(sign.leaves) // 8)
 
 
 def _record(sign: Signature, variable: str) -> tuple[int, str]:
@@ -271,6 +285,22 @@ class SharedMemoryBuffers:
         """Say from which values a level goes on, and what they are."""
         name = begun(level)
         self._commit(name, 1, self.layout.regions[name].packed.pack(how, *values))
+
+    def send(self, level: str, values: Values, places: Collection[int]) -> None:
+        """Ask a level to go on with these values of some of its leaves, by their places."""
+        bits = sum(1 << at for at in places)
+        marks = bits.to_bytes(-(-bits.bit_length() // 8), "little")
+        self._commit(mail(level), 1, self.layout.regions[mail(level)].packed.pack(*values, marks))
+
+    def sent(self, level: str, image: Image) -> dict[int, Value]:
+        """Return what somebody sets, by the places of leaves."""
+        *values, marks = self.layout.regions[mail(level)].packed.unpack(image.payload)
+        bits = int.from_bytes(marks, "little")
+        return {at: value for at, value in enumerate(values) if bits >> at & 1}
+
+    def stamp(self, region: str) -> int:
+        """Return the stamp of what was committed to a region last."""
+        return self.block.word(self.layout.regions[region].at)
 
     def since(self, region: str, stamp: int | None) -> list[Image | None]:
         """Return what was committed to a region after that of a stamp, in order, None for what cannot be read: at most the last two."""

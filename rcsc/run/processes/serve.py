@@ -11,16 +11,16 @@ import signal
 import struct
 import time
 from collections import ChainMap
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Callable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rcsc.run.adopt import Begun, restart
 from rcsc.run.description import Description
-from rcsc.run.levels import RunningLevel, StateTableError, running_level
+from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.processes.clocks import Clocks, Turn
-from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
-from rcsc.run.signature import Signature, Values
+from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout, mail
+from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import Kind, Outside, executors, signatures
 
 if TYPE_CHECKING:
@@ -79,9 +79,9 @@ class Setting:
         return Clocks(buffers.block, buffers.layout.size, self.periods_ms, self.in_step)
 
 
-AT_FIRST = 0
-BEGINNINGS = {1: Begun.CHECKPOINT, 2: Begun.ANEW}
-"""How a level says that it began: with its initial state, or otherwise."""
+AT_FIRST, REFUSES = 0, 4
+BEGINNINGS = {1: Begun.CHECKPOINT, 2: Begun.ANEW, 3: Begun.HAND}
+"""How a level says that it goes on: with its initial state, or otherwise; or that it refuses what was set by hand."""
 
 
 @dataclass(slots=True)
@@ -117,9 +117,56 @@ def begin(level: RunningLevel, transport: SharedMemoryBuffers) -> None:
     transport.begin(level.name, how, level.values)
 
 
-def cycle(level: RunningLevel, transport: SharedMemoryBuffers) -> int:
+@dataclass(slots=True)
+class Mail:
+    """What somebody sets of a level by hand, taken between two cycles.
+
+    Attributes:
+        inputs: Values of inputs, by their places; they hold for the next cycle, whatever the buffers say.
+    """
+
+    level: RunningLevel
+    memory: SharedMemoryBuffers
+    inputs: dict[int, Value] = field(default_factory=dict)
+    _stamp: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Leave what was meant for a level that has ended since."""
+        self._stamp = self.memory.stamp(mail(self.level.name))
+
+    def take(self) -> None:
+        """Go on from what was set since, and say so; refuse a state that no cycle may begin with."""
+        images = [
+            image for image in self.memory.since(mail(self.level.name), self._stamp) if image is not None
+        ]
+        if not images:
+            return
+        self._stamp = images[-1].stamp
+        name, sign = self.level.name, self.level.sign
+        places = {at: value for image in images for at, value in self.memory.sent(name, image).items()}
+        values = tuple(places.get(at, value) for at, value in enumerate(self.level.values))
+        try:
+            self.level.restore(values)
+        except BadState:
+            self.memory.begin(name, REFUSES, self.level.values)
+            return
+        self.inputs |= {at: value for at, value in places.items() if sign.leaves[at].kind == "input"}
+        self.memory.begin(
+            name, next(how for how, begun in BEGINNINGS.items() if begun is Begun.HAND), self.level.values
+        )
+
+    def put(self) -> None:
+        """Put the inputs that were set over those that were taken."""
+        for at, value in self.inputs.items():
+            self.level.executor.put(at, (value,))
+        self.inputs.clear()
+
+
+def cycle(level: RunningLevel, transport: SharedMemoryBuffers, held: Mail | None = None) -> int:
     """Run one cycle of a level; return the fault, 0 for none."""
     level.take(transport)
+    if held is not None:
+        held.put()
     fault = level.run()
     transport.commit(level.name, level.values)
     return fault
@@ -136,8 +183,9 @@ def serve_level(setting: Setting, name: str, told: "Connection") -> None:
             turn.done()
         transport.now_ms = turn.now_ms
         begin(level, transport)
-        for _ in _rounds(setting, turn, transport):
-            if cycle(level, transport):
+        held = Mail(level, transport)
+        for _ in _rounds(setting, turn, transport, held.take):
+            if cycle(level, transport, held):
                 raise SystemExit(FAULTY)
 
 
@@ -184,8 +232,17 @@ def attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMem
         buffers.close()
 
 
-def _rounds(setting: Setting, turn: Turn, buffers: SharedMemoryBuffers) -> Iterator[int]:
-    """Yield a process's ticks, each when it is due and its turn has come, until SIGTERM or the end of its parent."""
+def _rounds(
+    setting: Setting, turn: Turn, buffers: SharedMemoryBuffers, before: Callable[[], None] | None = None
+) -> Iterator[int]:
+    """Yield a process's ticks, each when it is due and its turn has come, until SIGTERM or the end of its parent.
+
+    Args:
+        setting: Of all.
+        turn: Of this process.
+        buffers: Are told the time.
+        before: Done before each, also before one that the process skips as it is held.
+    """
     told: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
     period_s = setting.periods_ms[turn.name] / 1000
@@ -195,8 +252,11 @@ def _rounds(setting: Setting, turn: Turn, buffers: SharedMemoryBuffers) -> Itera
         if told:
             return
         buffers.now_ms = turn.now_ms
-        yield tick
-        tick += 1
+        if before is not None:
+            before()
+        if not turn.clocks.skips(turn.name):
+            yield tick
+            tick += 1
         turn.done()
         pace.wait(told)
 

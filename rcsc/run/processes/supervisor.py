@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Self
 from rcsc.base.host import children
 from rcsc.run.description import Description
 from rcsc.run.executors import refuse_unproved
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.processes.attach import RunningSystem, is_held
 from rcsc.run.processes.clocks import Clocks
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
@@ -48,11 +50,13 @@ class Course:
         in_step: Whether each takes what the cycle before left, as in one process.
         log: Where a diagnostic process records every cycle; None for no such process.
         most: Ticks after which all stand; None for no such number.
+        system: Path of the description, by which others attach; None where nobody is to.
     """
 
     in_step: bool = False
     log: Path | None = None
     most: int | None = None
+    system: Path | None = None
 
 
 COURSE = Course()
@@ -117,7 +121,10 @@ class Supervisor:
             name: max(STILL_S, STILL_PERIODS * period_ms / 1000 / (rate or 1.0))
             for name, period_ms in periods_ms.items()
         }
-        self.buffers = SharedMemoryBuffers.create(laid, Clocks.size(len(periods_ms)))
+        self._attached, self._closed = 0, False
+        note = _note(description, tuple(outside), rate, course)
+        self.buffers = SharedMemoryBuffers.create(laid, Clocks.size(len(periods_ms)) + len(note))
+        self.buffers.block.write(laid.size + Clocks.size(len(periods_ms)), note)
         self._setting = Setting(
             description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms, course.in_step
         )
@@ -187,18 +194,30 @@ class Supervisor:
     @property
     def over(self) -> bool:
         """True once a process outside the levels has ended well, or all have run as many ticks as they are to."""
-        return any(self.code(name) == 0 for name in self._outside) or self._all_at(self._clocks.limit_ms)
+        return any(self.code(name) == 0 for name in self._outside) or self._at_end
 
-    def _all_at(self, limit_ms: int | None) -> bool:
-        """Whether no process has a cycle left before a time."""
-        clocks = (self._clocks.now_ms(name) for name in self._clocks.periods_ms)
-        return limit_ms is not None and all(now_ms is None or now_ms >= limit_ms for now_ms in clocks)
+    def let_go(self) -> None:
+        """Let all go on where who was attached has died; have the log say who comes and goes."""
+        name, now = self.buffers.block.name, self._clocks.attached
+        if now and not is_held(name):
+            self._clocks.let_go()
+            now = 0
+        if now != self._attached:
+            self.note("", "somebody is attached" if now else "nobody is attached any more")
+            self._attached = now
+
+    @property
+    def _at_end(self) -> bool:
+        """Whether no process has a cycle left."""
+        limit_ms = self._clocks.limit_ms
+        return limit_ms is not None and self._clocks.all_at(limit_ms)
 
     def note(self, name: str, what: str) -> None:
-        """Have the log say what became of a process."""
+        """Have the log say what became of a process, or "" of the system."""
+        now_ms = [self._clocks.now_ms(each) or 0 for each in ((name,) if name else self._clocks.periods_ms)]
         if self._recorder is not None:
             with contextlib.suppress(OSError):  # it has ended, and `unrecorded` says so
-                self._recorder.tells.send((name, what, self._clocks.now_ms(name) or 0))
+                self._recorder.tells.send((name, what, max(now_ms)))
 
     def unrecorded(self) -> str:
         """Return the reason why nothing is recorded any more, once: nobody waits for the diagnostic process from then on."""
@@ -274,6 +293,10 @@ class Supervisor:
     def close(self) -> None:
         """End all processes, after the same cycle where a diagnostic process records them, and remove the shared memory."""
         with children.interrupts_held():
+            if self._closed:
+                return
+            self._closed = True
+            self._clocks.let_go()
             if self._recorder is not None:
                 self._end_together()
             for process in self._running.values():
@@ -298,7 +321,7 @@ class Supervisor:
         if (limit_ms := self._clocks.limit_ms) is None or end_ms < limit_ms:
             self._clocks.stop_at(end_ms)
         seen, since_s, used_s = dict[str, tuple[int | None, int]](), time.monotonic(), dict[str, float]()
-        while not self._all_at(self._clocks.limit_ms) and not self.unrecorded():
+        while not self._at_end and not self.unrecorded():
             for name in self._clocks.periods_ms:
                 if not self.runs(name) or self._clocks.left(name):
                     self._clocks.leave(name)
@@ -323,6 +346,17 @@ class Supervisor:
         level = sign.level_of(name)
         table = f", table `{sign.table_of(level, values)}`" if level.stages else ""
         return f"level `{name}`{table}: {sign.fault_seen(level, values)}"
+
+
+def _note(description: Description, outside: tuple[str, ...], rate: float, course: Course) -> bytes:
+    """Return the end of the block, by which others attach; empty where nobody is to."""
+    if course.system is None:
+        return b""
+    path = course.system.resolve()
+    found = RunningSystem(
+        "", description.name, path, outside, fingerprints(description), rate, course.in_step
+    )
+    return found.text()
 
 
 @dataclass(frozen=True, slots=True)
@@ -400,6 +434,7 @@ def run_processes(  # noqa: PLR0913  # as many as there are things to choose
             system.check()
             if why := system.unrecorded():
                 say(why)
+            system.let_go()
             for name, why in system.still().items():
                 if name in outside:
                     raise ChildProcessError(f"process `{name}` stands still: {why}")

@@ -150,9 +150,11 @@ class Live(Concern):
         return self.state()
 
     def close(self) -> None:
-        """Stop running, and end the log that is being written."""
+        """Stop running, end the log that is being written, and let a system go on that runs elsewhere."""
         self._going = None
         self._end_log()
+        if self.commands is not None:
+            self.commands.session.leave()
 
     def open(self) -> None:
         """Open the system anew; the run before is gone."""
@@ -189,6 +191,8 @@ class Live(Concern):
     def _drop(self, why: str) -> None:
         """End a run whose system goes away, with its log, and report that to whoever asked for it."""
         self._end_log()
+        if self.commands is not None:
+            self.commands.session.leave()
         going, self._going, self._ended = self._going, None, ""
         if going is not None:
             going.done(lambda: _shown([], Refused(Code.STUDIO, why)))

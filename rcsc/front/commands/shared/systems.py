@@ -22,6 +22,10 @@ PLANT = click.option(
     "--plant", "plant", default=None, metavar="PLANT",
     help="What stands outside: a file FILE.py or FILE.py:CLASS, or a plant's name in the description; else its first.",
 )  # fmt: skip
+ATTACH = click.option(
+    "--attach", "attached", is_flag=False, flag_value="", default=None, metavar="[NAME]",
+    help="Attach to what `rcsc run --processes` runs on this machine: by its system's name, where several run.",
+)  # fmt: skip
 EXECUTOR = click.option(
     "--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,
     help="Which of the generated executors run; both do the same.",

@@ -169,7 +169,8 @@ def _summary(log: Log) -> None:
                     click.echo(f"    never  {', '.join(table.never)}")
     named = {level.name for level in log.levels}
     for event in [event for event in log.events if event.process not in named][:SHOWN]:
-        click.echo(f"process {event.process}: {event.what}, before cycle {event.tick}")
+        who = f"process {event.process}: " if event.process else ""
+        click.echo(f"{who}{event.what}, before cycle {event.tick}")
 
 
 def _summed(log: Log, level: LoggedLevel) -> None:

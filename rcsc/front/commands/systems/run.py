@@ -402,6 +402,9 @@ def _rows_apart(
     rate = asked.rate or WATCHED_RATE
     if not asked.quiet:
         click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
+        click.echo(
+            f"`rcsc studio --attach {system.name}` shows them as they run, `rcsc shell --attach {system.name}` too"
+        )
 
     def show(*_: Supervisor) -> None:
         new = [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
@@ -412,7 +415,7 @@ def _rows_apart(
     results.touch()
     run_processes(
         system, asked.kind, {"outside": outside}, queries=queries, rate=rate,
-        course=Course(asked.in_step, log, asked.most), watch=show,
+        course=Course(asked.in_step, log, asked.most, asked.path), watch=show,
     )  # fmt: skip
     show()
     return rows

@@ -24,8 +24,9 @@ from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.commands import Commands
 from rcsc.desk.shell.opening import Opening, opened
 from rcsc.front.commands.shared.stopped import attach
-from rcsc.front.commands.shared.systems import COMPILES, EXECUTOR, PLANT, made, system_path
+from rcsc.front.commands.shared.systems import ATTACH, COMPILES, EXECUTOR, PLANT, made, system_path
 from rcsc.run.orders.script import BadScript
+from rcsc.run.processes.attach import find
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession
@@ -58,12 +59,13 @@ In the shell:
 @EXECUTOR
 @PLANT
 @COMPILES
+@ATTACH
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
 def command(
-    script: Path | None, executor: str, plant: str | None, compiles: bool, alone: bool, system: Path | None
-) -> int:
+    script: Path | None, executor: str, plant: str | None, compiles: bool, attached: str | None, alone: bool, system: Path | None
+) -> int:  # fmt: skip
     """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
 
     SYSTEM is a system's description or a folder that has one; without it, system.toml here or in tables/. What changed is proved
@@ -71,10 +73,17 @@ def command(
     """
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     written = None if script is None else _text(script)
-    path = system_path(system)
-    if not made(path, compiles=compiles, quiet=True):
-        return 1
-    commands = opened(Opening(path, kind, plant or "", alone=alone))
+    if attached is not None:
+        if system or plant or alone:
+            raise click.UsageError("--attach names what runs: leave system and plant out")
+        found = find(attached)
+        opening = Opening(found.system, kind, attached=found)
+    else:
+        path = system_path(system)
+        if not made(path, compiles=compiles, quiet=True):
+            return 1
+        opening = Opening(path, kind, plant or "", alone=alone)
+    commands = opened(opening)
 
     asks = written is None and typed()
     try:
@@ -84,6 +93,7 @@ def command(
             _listen(commands)
         return _follow(commands, _lines(written), "-" if script is None else str(script))
     finally:
+        commands.session.leave()
         commands.session.end_log()
 
 

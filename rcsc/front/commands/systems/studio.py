@@ -11,9 +11,10 @@ from rcsc.base.host.guard import door
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
-from rcsc.front.commands.shared.systems import EXECUTOR, PLANT, SYSTEM, meant, tables_meant
+from rcsc.front.commands.shared.systems import ATTACH, EXECUTOR, PLANT, SYSTEM, meant, tables_meant
 from rcsc.lang.project import project_root
 from rcsc.run.description import description
+from rcsc.run.processes.attach import find
 
 if TYPE_CHECKING:
     from rcsc.desk.studio.scene import Drawer
@@ -26,6 +27,7 @@ Examples:
   rcsc studio my_robot                the system in a folder, with its plant and the script that it names
   rcsc studio make_boxt               a script of the system that is here, row by row
   rcsc studio --plant mujoco          with another of its plants
+  rcsc studio --attach                a system that runs in processes, also one that somebody else started
   rcsc studio --alone                 nothing outside the levels: what comes in is set by hand
   rcsc studio tables/examples/grip.rcs    a table, with its proof and its graph; a folder of tables, too""",
 )
@@ -35,6 +37,7 @@ Examples:
               help="Who gives orders: a CSV or TOML file, or the name of one here or in its scripts/; else its own.")  # fmt: skip
 @PLANT
 @EXECUTOR
+@ATTACH
 @click.option("--by-hand", is_flag=True, help="No script gives orders: they are typed.")
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
@@ -49,8 +52,8 @@ Examples:
 @click.option("--trust", "trusts", is_flag=True,
               help="Agree that the code of SYSTEM's folder runs, now and later; else the page asks, once a folder.")  # fmt: skip
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, by_hand: bool, alone: bool,
-    seed: int, logs: tuple[Path, ...], port: int, opens: bool, trusts: bool,
+    target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str, attached: str | None,
+    by_hand: bool, alone: bool, seed: int, logs: tuple[Path, ...], port: int, opens: bool, trusts: bool,
 ) -> int:  # fmt: skip
     """Open one page for SYSTEM: its tables, their proof, the levels as they run, and what stands outside them.
 
@@ -60,6 +63,16 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     this machine; its address has a token that nobody else knows. Ctrl-C ends it; what was typed and not saved is kept, and it says where.
     """
     need("studio")
+    if attached is not None:
+        if target or system or script or plant or by_hand or alone:
+            raise click.UsageError("--attach names what runs: leave system, script and plant out")
+        found = find(attached)
+        agreement = Agreement(Path(project_root(str(found.system))))
+        if trusts:
+            agreement.give()
+        held: Literal["c", "python"] = "c" if executor == "c" else "python"
+        serve(Opening(found.system, held, attached=found), agreement, port=port, opens=opens, logs=logs)
+        return 0
     tables = tables_meant(target, logs) if system is None and script is None else None
     path, named = meant(target, system, script) if tables is None else (tables, "")
     if by_hand and named:
@@ -113,6 +126,8 @@ def serve(
             click.launch(held.enter_context(door(address)).as_uri())
 
     pace = WATCHED if runs_at is None else Pace(runs_at, runs=True)
+    if opening.attached is not None:
+        pace = Pace(None, runs=True)  # its own
     answer = concerns(opening, server.hub, agreement, logs, pace, _drawer(opening.path), first)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as held:
         server.serve(answer, told)
