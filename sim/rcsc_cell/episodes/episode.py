@@ -4,7 +4,6 @@ In: parts, a script, what goes wrong and when. Out: rows, findings, lines of tab
 the same outcome in every process and with both kinds of executors.
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import chain
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import ClassVar, get_args
 
 from rcsc.base.host.files.names import shown
+from rcsc.base.host.files.read import rows_of
 from rcsc.run.episodes.episode import FAULTS as OF_ANY_SYSTEM
 from rcsc.run.episodes.episode import BufferFault, Harm, Restart, SavedEpisode, Switch, window_told
 from rcsc.run.episodes.episode import Episode as EpisodeOfAnySystem
@@ -194,7 +194,7 @@ class Episode(SavedEpisode):
 
 def _row_told(row: str) -> str:
     """Return a row of a script as a report has it, without its commas."""
-    return " ".join(cell for cell in next(csv.reader([row])) if cell)
+    return " ".join(cell for told in rows_of(script((row,)), COLUMNS) for cell in told.values() if cell)
 
 
 def script(rows: Sequence[str]) -> str:
