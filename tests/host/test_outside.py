@@ -57,6 +57,7 @@ FORMATS_OF_OURS = {
     "rcsc/code/testing/executors/externs.py", "rcsc/code/testing/coverage/harness.py", "rcsc/lang/operator_table.py",  # reals as bits
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
+    "rcsc/run/processes/attach.py", "rcsc/run/log/schema.py",
     "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/run/link/beside.py",
     "rcsc/run/orders/stopped.py", "rcsc/proof/certify", "rcsc/run/campaign/work.py",
 }  # fmt: skip
@@ -94,6 +95,7 @@ READERS_OF_FILES: Mapping[str, str] = {
     "rcsc/base/host/tools.py": "the pinned ESBMC, for its digest",
     "rcsc/run/processes/supervisor.py": "/proc",
     "rcsc/run/processes/block.py": "shared memory of its own",
+    "rcsc/run/processes/attach.py": "shared memory of rcsc's, and `/proc`",
     "rcsc/run/campaign/journal.py": "is added to and read in one opening, regular and bounded by itself",
     "rcsc/front/commands/systems/shell.py": "is added to",
     "rcsc/run/log/recorder.py": "is written",
@@ -198,6 +200,7 @@ BEGUN = (
 NO_PROCESS = {
     ("rcsc/run/processes/block.py", "multiprocessing"),  # shared memory, no process
     ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
+    ("rcsc/run/processes/diagnose.py", "multiprocessing"),  # likewise
     ("rcsc/code/testing/apart.py", "multiprocessing"),  # likewise
     ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
     (

@@ -334,7 +334,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
     log = _log_path(asked, system)
     with _writable(log):
         if log.is_file() or not log.exists():
-            log.open("ab").close()
+            log.touch()
     begun = time.perf_counter()
     with scratch("run") as folder:
         ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results", log)
