@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.desk.shell.opening import Opening, opened
 from rcsc.front.commands import run
 from rcsc.run.orders.script import BadScript
 from rcsc.run.system import System
@@ -22,8 +23,10 @@ from rcsc_cell.database.readable import NUMBERED
 from rcsc_cell.episodes.witness import placements
 from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.script import ScriptRow, read_script
+from rcsc_cell.workstation.station import Workstation
 from tests.support.cells import REPO, SYSTEM, prepare
 from tests.support.programs.texts import one_row_a_line
+from tests.support.shells import do
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object", "open_grip")
 DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
@@ -383,6 +386,20 @@ def test_a_row_meets_the_faults_that_its_script_names(
         told = capfd.readouterr()
         assert said in told.out + told.err
         assert ("VISE-OPEN RIGHT                            done" in told.out) == (faults != "vise_stick")
+
+
+def test_after_undo_a_row_still_meets_its_faults(project: Path) -> None:
+    """What switches them is taken back together with whose row it is and whose faults they are."""
+    rows = "VISE-OPEN RIGHT,,,,,\nVISE-CLOSE RIGHT,,,,,vise_stuck\n"
+    script = project / "stuck.csv"
+    script.write_text(HEAD.replace("\n", ",fault\n") + rows, encoding="utf-8")
+    shell = opened(Opening(project / "tables/system.toml", script=str(script), plant="kinematic"))
+    do(shell, "step 2", "undo 2", "run 400")
+    [workstation] = [part for part in shell.session.system.outside if isinstance(part, Workstation)]
+    assert [(result.row.number, result.state) for result in workstation.results] == [
+        (1, "done"),
+        (2, "failed"),
+    ]
 
 
 FIG_7 = """

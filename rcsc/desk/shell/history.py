@@ -77,7 +77,7 @@ def kept(
         system.levels,
         tuple(level.values for level in system.levels),
         dict(memory.held),
-        tuple(_copied(outside) for outside in system.outside),
+        _copied(system.outside),
         dict(answers),
         memory.frozen,
         tuple(system.restarts),
@@ -95,9 +95,10 @@ def put_back(moment: KeptMoment, system: System, memory: Memory) -> None:
         level.values = values  # the trace too, which the executor does not take back
 
 
-def _copied(outside: Outside) -> Outside:
-    """A copy that shares what never changes, as the database."""
-    return copy.deepcopy(outside, {id(part): part for part in _parts(outside) if _is_frozen(part)})
+def _copied(outside: tuple[Outside, ...]) -> tuple[Outside, ...]:
+    """Copies that share what never changes, as the database; what two of them had in common, their copies have, too."""
+    frozen = {id(part): part for one in outside for part in _parts(one) if _is_frozen(part)}
+    return copy.deepcopy(outside, frozen)
 
 
 def _parts(whole: object) -> list[object]:
