@@ -65,14 +65,16 @@ def _unread_elsewhere(report: Report) -> Report:
 
 def _staying_outside(report: Report) -> Report:
     """Return the report without warnings of outputs after a fault that no system leads to somebody outside its levels."""
+    told = {each.primary.span.file for each in report.diagnostics if each.code is Code.STAYS_AFTER_FAULT}
+    led = {file: {name for system in systems_above(file) for name in _outside(system)} for file in told}
 
     def kept(each: Diagnostic) -> bool:
         span = each.primary.span
-        return each.code is not Code.STAYS_AFTER_FAULT or report.sources[span.file].slice(span) in {
-            name for system in systems_above(span.file) for name in _outside(system)
-        }
+        return (
+            each.code is not Code.STAYS_AFTER_FAULT or report.sources[span.file].slice(span) in led[span.file]
+        )
 
-    return replace(report, diagnostics=tuple(filter(kept, report.diagnostics)))
+    return replace(report, diagnostics=tuple(filter(kept, report.diagnostics))) if told else report
 
 
 def _outside(system: Path) -> Iterator[str]:

@@ -7,18 +7,15 @@ from rcsc.base.diagnostics.codes import FAMILIES, Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.front.commands.group import commands
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.findings.unread import TOLD
 from tests.support.programs.stages import reported, unread_in
 
 NOTES = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 
-UNREAD = {Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER, Code.STAYS_AFTER_FAULT}
-"""What `rcsc check` asks of a whole file, which the examples of other codes are not."""
-
-
 def told(code: Code, text: str) -> list[Diagnostic]:
-    found = [*reported(text, Options()), *(unread_in(text) if code in UNREAD else ())]
+    found = [*reported(text, Options()), *(unread_in(text) if code in TOLD else ())]
     return [each for each in found if each.severity is not Severity.NOTE or each.code in NOTES]
 
 

@@ -26,7 +26,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.described import nearest
 from rcsc.base.host.files.read import CheckedFields, Malformed, json_of
 from rcsc.run.description import Description, description
-from rcsc.run.levels import Query
+from rcsc.run.levels import Query, RunningLevel
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.processes.block import FOLDER, PREFIX, Block
 from rcsc.run.processes.clocks import LONGEST_NAP_S, SHORTEST_NAP_S, Clocks
@@ -216,7 +216,7 @@ class AttachedSystem(System):
             self.link.let_until(self.tick * tick_ms)
             end_ms = clocks.latest_ms("") + 1
         for level in self.levels:
-            self._read(level.name)
+            self._read(level)
         self._take_buffers()
 
     def step(self) -> None:
@@ -231,8 +231,10 @@ class AttachedSystem(System):
         self.link.let_until(now_ms + self.description.tick_ms)
         ran = tuple(
             level for level in self.levels
-            if self.link.memory.checkpoint_ms(level.name) > before[level.name] and self._read(level.name)
+            if self.link.memory.checkpoint_ms(level.name) > before[level.name]
         )  # fmt: skip
+        for level in ran:
+            self._read(level)
         self._take_buffers()
         self.tick += 1
         for watch in self.watch:
@@ -269,16 +271,14 @@ class AttachedSystem(System):
                 self.link.memory.send(level.name, values, changed)
                 self._sent[level.name] = changed
 
-    def _read(self, name: str) -> bool:
+    def _read(self, level: RunningLevel) -> None:
         """Take over what a level's last cycle left; what it holds at first where it had none."""
-        level = self.level(name)
-        values = self.link.memory.checkpoint(name)
+        values = self.link.memory.checkpoint(level.name)
         if not isinstance(values, NotShared):
             level.put_back(values)
             level.values = values  # the trace, too
-        self._known[name] = level.values
-        self._sent.pop(name, None)
-        return True
+        self._known[level.name] = level.values
+        self._sent.pop(level.name, None)
 
     def _take_buffers(self) -> None:
         for wire in self.description.wires:

@@ -36,7 +36,7 @@ from rcsc.run.log.schema import (
     outside_wires,
     taken_layout,
 )
-from rcsc.run.processes.clocks import Clocks
+from rcsc.run.processes.clocks import LONGEST_NAP_S, SHORTEST_NAP_S, Clocks
 from rcsc.run.processes.memory import (
     CHECKPOINT,
     NO_CYCLE_MS,
@@ -51,8 +51,6 @@ from rcsc.run.signature import Signature, Values
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
-
-SHORTEST_NAP_S, LONGEST_NAP_S = 50e-6, 2e-3
 
 
 @dataclass(slots=True)
