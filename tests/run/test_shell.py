@@ -674,7 +674,11 @@ def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Ki
         ("state at_opening : bool", "state at_opening : bool = true\nstate other : bool", ""),
         ("enum gripper_state { d_state, ", "enum gripper_state { ", "RCS2"),
         ("state at_opening : bool", "state at_opening : intt", "RCS2"),
-        ("  drive : bool\n", "  drive : bool\n  twice : bool\n", "buffer `gripper.to_hand` has another form"),
+        (
+            "  drive : bool safe false\n",
+            "  drive : bool safe false\n  twice : bool\n",
+            "buffer `gripper.to_hand` has another form",
+        ),
         (
             "## Within half",
             "invariant counted : waited = 0 implies inc_command_seen = inc_command_seen\n## Within half",
