@@ -13,7 +13,7 @@ from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import lies_in, lying, stale, write
 from rcsc.code.emit.lower import lower
 from rcsc.code.emit.plan import Plan
-from rcsc.driver.pipeline import proved
+from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import PROJECT_FILE, prefix, project_root, systems_above
@@ -51,11 +51,7 @@ def compile_(
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
-    generated = Generated(targets, defensive)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    for path in systems:
-        generated.add_system(path)
+    generated = generated_of(project, systems, targets, defensive)
     files = generated.files
     diagnostics = generated.clashes or (stale if only_check else write)(files, str(folder))
     report = project.report(tuple(diagnostics))
@@ -161,6 +157,11 @@ def files_of(program: ProvedProgram, targets: Collection[str], defensive: bool) 
     return emitted(planned(program, defensive=defensive), targets)
 
 
+def files_of_system(path: Path, project: Proved, targets: Collection[str], defensive: bool) -> dict[str, str]:
+    """Return the generated files of a system and its programs, as their tables give them; raises `BadDescription`."""
+    return generated_of(project, (path,), targets, defensive).files
+
+
 def _lying(made: Mapping[str, str], folder: Path, *, defensive: bool) -> CodeFound:
     """Hold what lies in a folder against what the tables give, language by language; of none of them all is missing."""
     lie = tuple(name for name in _languages(made) if (folder / name).is_dir()) or _languages(made)
@@ -264,6 +265,22 @@ class Generated:
                     Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
                 )
                 return
+
+
+def generated_of(
+    project: Proved, systems: Iterable[Path], targets: Collection[str], defensive: bool
+) -> Generated:
+    """Make the files of all programs of a project, and the C of systems of them.
+
+    Raises:
+        BadDescription: A system does not fit its programs.
+    """
+    found = Generated(targets, defensive)
+    for root, program in project.executable:
+        found.add_program(root, program)
+    for path in systems:
+        found.add_system(path)
+    return found
 
 
 def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:

@@ -23,8 +23,18 @@ from rcsc.code.testing.coverage.vector_set import figure, vector_set, write_vect
 from rcsc.code.testing.inputs.snapshot import Missing
 from rcsc.code.testing.mutants import Opinion
 from rcsc.code.testing.suite import Proofs, SuiteOptions, run_suite
-from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
-from rcsc.driver.pipeline import Proved, proved
+from rcsc.driver.compile import (
+    CodeFound,
+    Generated,
+    code_of,
+    files_of,
+    files_of_system,
+    generated_of,
+    planned,
+    systems_in,
+    tables_in,
+)
+from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings, TestEffort
 from rcsc.driver.watched import claims_of
 from rcsc.lang.model import Expr, Program, ProvedProgram, Snapshot, Table
@@ -73,8 +83,8 @@ def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion
         diagnostics += wrong
         figures += [text, f"  tested: {found.words}"]
     for path in systems:
-        found = code_of(str(path), partial(_files, path, project), code, (path,))
-        generated = replace(_generated(path, project, found.defensive), files=dict(found.files))
+        found = code_of(str(path), partial(files_of_system, path, project, TARGETS), code, (path,))
+        generated = replace(generated_of(project, (path,), TARGETS, found.defensive), files=dict(found.files))
         claims = NOTHING
         if alone:
             plant_of(description(path), effort.plant)  # refused before anything is proved
@@ -142,19 +152,6 @@ def _beside(path: Path, generated: Generated, effort: TestEffort, progress: Call
         return (), figure
     message = f"the C of system `{whole.word}` and the Python system differ: {ran.difference}"
     return (Diagnostic(Code.EXECUTORS_DISAGREE, message, Label(Span(str(path), 0, 0))),), ""
-
-
-def _generated(path: Path, project: Proved, defensive: bool) -> Generated:
-    """Make the executors of a system's programs, and the C of the whole."""
-    generated = Generated(tuple(TARGETS), defensive)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    generated.add_system(path)
-    return generated
-
-
-def _files(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
-    return _generated(path, project, defensive).files
 
 
 def _in_plant(  # as many as there are facts

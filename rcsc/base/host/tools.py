@@ -66,7 +66,6 @@ def write_c(files: Mapping[str, str], place: Path) -> list[str]:
     return sorted(Path(path).name for path in files if path.endswith(".c"))
 
 
-@cache
 def c_compiler() -> str | Absent:
     """Return the system's C compiler (`$CC`, else cc, gcc or clang)."""
     names = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]

@@ -18,7 +18,7 @@ from rcsc.lang.restart import COMMAND
 from rcsc.run.description import Description, description
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.orders.numbered import Orders
-from rcsc.run.orders.operator import MOST_TICKS, ScriptedRun, line_to
+from rcsc.run.orders.operator import MOST_TICKS, UNORDERED_TICKS, ScriptedRun, line_to
 from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.plant.staged import Staged
 from rcsc.run.plant.staging import StageOrder, staged, standing
@@ -277,10 +277,6 @@ def run(  # noqa: PLR0913  # as many as there are options
     done = operator is None or (operator.over and operator.stopped is None)
     failed = tuple(level.name for level in running.levels if level.values[-1])
     return Run(rows, done, running.tick, running.tick * system.tick_ms / 1000, failed)
-
-
-UNORDERED_TICKS = 1000
-"""Of a run that no script ends."""
 
 
 def _staged(

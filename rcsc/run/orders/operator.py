@@ -17,6 +17,10 @@ from rcsc.run.system import System
 
 MOST_TICKS = 100_000
 """Ticks after which a run is given up: more than an hour of control time at 40 ms."""
+UNORDERED_TICKS = 1000
+"""Of a run that no script ends, where nobody says."""
+WATCHED_RATE = 4.0
+"""How many times as fast as the clock processes and a system that somebody watches run, where nobody says."""
 REST_TICKS = 200
 """Within which a level has answered that it rests."""
 

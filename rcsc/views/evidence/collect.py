@@ -11,7 +11,16 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.code.emit.generated import written
 from rcsc.code.testing.apart import Ended, apart
-from rcsc.driver.compile import CodeFound, Generated, code_of, files_of, planned, systems_in, tables_in
+from rcsc.driver.compile import (
+    CodeFound,
+    code_of,
+    files_of,
+    files_of_system,
+    generated_of,
+    planned,
+    systems_in,
+    tables_in,
+)
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
@@ -116,24 +125,12 @@ def _subjects(
         tables = tuple(sorted(name for name in closure(root, project.loaded) if Path(name).is_file()))
         yield _Looks(program.program.name, root, tables, found, partial(_looked, subject))
     for path in systems:
-        generated = _generated(path, project)
+        generated = generated_of(project, (path,), ("c",), defensive=False)
         clashes += generated.clashes
         if not generated.clashes:
-            found = code_of(str(path), partial(_c_of, path, project), code, (path,))
+            found = code_of(str(path), partial(files_of_system, path, project, ("c",)), code, (path,))
             system = Whole(generated.systems[path], found.files)
             yield _Looks(system.system.word, str(path), (str(path),), found, partial(_whole, system))
-
-
-def _generated(path: Path, project: Proved, defensive: bool = False) -> Generated:
-    generated = Generated(("c",), defensive)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    generated.add_system(path)
-    return generated
-
-
-def _c_of(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
-    return _generated(path, project, defensive).files
 
 
 def _looked(subject: Subject, kind: str, progress: Callable[[str], None]) -> Evidence:

@@ -19,7 +19,7 @@ from rcsc.base.host.files.read import json_of
 from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
 from rcsc.compose.proof.standing import PROPERTY, KnownVerdict
-from rcsc.driver.compile import Generated, code_of, files_of, planned, systems_in, tables_in
+from rcsc.driver.compile import Generated, code_of, files_of, files_of_system, planned, systems_in, tables_in
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
@@ -126,15 +126,7 @@ def _lying(project: Proved, systems: tuple[Path, ...], code: CodeWanted) -> Iter
     for root, program in project.executable:
         yield from code_of(root, partial(files_of, program, TARGETS), code, systems).stale
     for path in systems:
-        yield from code_of(str(path), partial(_files_of_system, path, project), code, (path,)).stale
-
-
-def _files_of_system(path: Path, project: Proved, defensive: bool) -> dict[str, str]:
-    generated = Generated(("c",), defensive)
-    for root, program in project.executable:
-        generated.add_program(root, program)
-    generated.add_system(path)
-    return generated.files
+        yield from code_of(str(path), partial(files_of_system, path, project, ("c",)), code, (path,)).stale
 
 
 def _matrix(

@@ -23,7 +23,7 @@ from rcsc.lang.project import project_root
 from rcsc.run.faults import faults_of
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.read import LoggedLevel
-from rcsc.run.orders.operator import Operator
+from rcsc.run.orders.operator import WATCHED_RATE, Operator
 from rcsc.run.orders.roles import Served, field_of, served
 from rcsc.run.orders.together import Together
 from rcsc.run.signature import Leaf
@@ -39,8 +39,6 @@ TOLD_S = 0.08
 LONGEST_LINE = 4000
 """Characters of a command."""
 FASTEST = 1000.0
-WATCHED_RATE = 4.0
-"""How many times as fast as the clock a system runs that somebody watches, where nobody says."""
 MOST_MARKS = 2000
 _LOOKING = ("?", "help", "show", "lines", "levels", "buffers", "breaks", "faults", "diff", "expect")
 """Commands that change nothing, and leave no mark on the time line."""

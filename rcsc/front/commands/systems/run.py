@@ -22,7 +22,7 @@ from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLA
 from rcsc.front.commands.systems.studio import serve
 from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription, Description, description
-from rcsc.run.orders.operator import MOST_TICKS, Operator, ScriptedRun
+from rcsc.run.orders.operator import MOST_TICKS, UNORDERED_TICKS, WATCHED_RATE, Operator, ScriptedRun
 from rcsc.run.orders.script import BadScript
 from rcsc.run.orders.stopped import NotKept, StoppedRuns
 from rcsc.run.plant.staging import StageOrder, staged, standing
@@ -35,11 +35,6 @@ from rcsc.views.pages.witness import RunWitness
 
 if TYPE_CHECKING:
     from rcsc.run.plant.staged import Staged
-
-UNORDERED_TICKS = 1000
-"""Cycles of a run that no script ends."""
-WATCHED_RATE = 4.0
-"""How many times as fast as the clock processes and a page that is watched run, where nobody says."""
 
 
 @dataclass(frozen=True, slots=True)
