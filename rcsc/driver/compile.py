@@ -1,7 +1,7 @@
 """`rcsc compile`: the executors of every proved program."""
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,10 +9,14 @@ from pathlib import Path
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
+from rcsc.base.host import children
+from rcsc.base.host.tools import c_compiler, ending, run_command, write_c
 from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import lies_in, lying, stale, write
 from rcsc.code.emit.lower import lower
 from rcsc.code.emit.plan import Plan
+from rcsc.code.testing.executors.externs import not_importable
+from rcsc.code.testing.executors.native import COMPILE_S
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
@@ -53,11 +57,35 @@ def compile_(
         return Conclusion(report, "nothing was written")
     generated = generated_of(project, systems, targets, defensive)
     files = generated.files
-    diagnostics = generated.clashes or (stale if only_check else write)(files, str(folder))
+    diagnostics = generated.clashes or _kept(files, str(folder), only_check=only_check)
     report = project.report(tuple(diagnostics))
     if report.failed:
         return Conclusion(report, "" if only_check else "nothing was written")
     return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {folder}")
+
+
+def _kept(files: Mapping[str, str], folder: str, *, only_check: bool) -> Sequence[Diagnostic]:
+    """Tell which files are not fresh, or write them: only if all can be imported and compiled."""
+    old = stale(files, folder)
+    if only_check or not old:
+        return old
+    return tuple(_unusable(files)) or write(files, folder)
+
+
+def _unusable(files: Mapping[str, str]) -> Iterator[Diagnostic]:
+    """Yield what cannot be used: Python that cannot be imported, C that a compiler refuses, where there is one."""
+    for path, text in files.items():
+        if path.endswith(".py") and (wrong := not_importable(text, path)):
+            message = f"the generated `{path}` cannot be imported: {wrong}"
+            yield Diagnostic(Code.INTERNAL, message, Label(Span(path, 0, 0)))
+    compiler = c_compiler()
+    with children.scratch("compile") as place:
+        sources = write_c(files, place)
+        if sources and isinstance(compiler, str):
+            ran = run_command([compiler, "-std=c99", "-fsyntax-only", "-w", *sources], place, COMPILE_S)
+            if ran.status != 0:
+                message = f"the generated C does not compile: {ending(ran, COMPILE_S)}"
+                yield Diagnostic(Code.NO_C_COMPILER, message, Label(Span(sources[0], 0, 0)))
 
 
 def compile_system(path: Path, *, only_check: bool = False) -> Conclusion:

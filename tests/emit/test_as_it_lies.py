@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.code.testing.apart import Ended, apart
+from rcsc.driver import compile as driver
 from rcsc.driver.settings import silent
 from rcsc.front.commands import run
 from tests.support.programs.texts import edit_file
@@ -132,3 +133,41 @@ def endless(doing: Callable[[str], None]) -> None:
 
 def test_a_trial_without_an_end_is_ended() -> None:
     assert apart(endless, progress=silent, silent_s=1) == Ended("no end in 1 s of waiting")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "told"),
+    [
+        ("a.py", "class State:", "1 = 1\n\n\nclass State:", "error[RCS902]: the generated `python/a.py` cannot be imported: SyntaxError"),
+        ("a.py", "class State:", "missing()\n\n\nclass State:", "cannot be imported: NameError: name 'missing' is not defined"),
+        ("a.c", "#include", "int 1;\n#include", "error[RCS603]: the generated C does not compile"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_imported_or_compiled_is_not_written(
+    project: Path,
+    file: str,
+    old: str,
+    new: str,
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """An emitter that errs; the user's module, which is not there, is none of its business."""
+    made, look = driver.emitted, 'extern procedure look writes left python "x.y:f" c "f"'
+    monkeypatch.setattr(
+        driver,
+        "emitted",
+        lambda *asked: {
+            path: text.replace(old, new, 1) if path.endswith(file) else text
+            for path, text in made(*asked).items()
+        },
+    )
+    edit_file(project / "a.rcs", ("level l", f"{look}\nlevel l"))
+    before = (project / "generated/python/a.py").read_text()
+    assert run(["compile", "a.rcs"]) != 0
+    assert told in "".join(capsys.readouterr())
+    assert (project / "generated/python/a.py").read_text() == before
+    monkeypatch.undo()
+    monkeypatch.chdir(project)
+    assert run(["compile", "-q", "a.rcs"]) == 0
+    assert "import x.y as" in (project / "generated/python/a.py").read_text()

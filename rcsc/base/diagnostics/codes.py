@@ -1539,7 +1539,8 @@ class Code(StrEnum):
     NO_C_COMPILER = """RCS603: the C compiler is missing or refuses
 
     `rcsc test` builds and runs the generated C. Install a C compiler (`cc` or the one `CC` names); where it refuses the code, its words
-    are shown, and that is a bug in rcsc or in the C of an extern procedure.
+    are shown, and that is a bug in rcsc or in the C of an extern procedure. `rcsc compile` has it look at the C, where there is one, and
+    writes nothing that it refuses.
     """
     MATCHER_DIFFERS = """RCS604: the C matcher is not shown equal to the table
 

@@ -9,7 +9,7 @@ import builtins
 import re
 import struct
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -116,18 +116,45 @@ class PythonStandIns:
     modules: Mapping[str, ModuleType] = field(hash=False)
 
     def load(self, text: str, name: str) -> ModuleType:
-        """The emitted Python as a module of its own that sees stand-ins where it imports the user's."""
-        module = ModuleType(name)
+        """The emitted Python as a module of its own that sees stand-ins where it imports the user's modules."""
+        return loaded(
+            text, name, lambda wanted: wanted in self.modules and self.modules[wanted.partition(".")[0]]
+        )
 
-        def imported(wanted: str, *args: object) -> object:
-            plain = len(args) < 3 or not args[2]  # `from x import y` is the executor's own
-            if plain and wanted in self.modules:
-                return self.modules[wanted.partition(".")[0]]
-            return builtins.__import__(wanted, *args)  # type: ignore[arg-type]  # handed on as it came
 
-        module.__dict__["__builtins__"] = {**vars(builtins), "__import__": imported}
-        exec(compile(text, name, "exec"), module.__dict__)  # noqa: S102  # it is what is tested
-        return module
+def loaded(text: str, name: str, stand_in: Callable[[str], object]) -> ModuleType:
+    """Return the emitted Python as a module of its own.
+
+    Args:
+        text: Of the module; it is run.
+        name: Of the module.
+        stand_in: Gives what the text finds where it imports a module of the user's, or nothing: then that module.
+    """
+    module = ModuleType(name)
+
+    def imported(wanted: str, *args: object) -> object:
+        plain = len(args) < 3 or not args[2]  # `from x import y` is the executor's own
+        return (plain and stand_in(wanted)) or builtins.__import__(wanted, *args)  # type: ignore[arg-type]  # handed on as it came
+
+    module.__dict__["__builtins__"] = {**vars(builtins), "__import__": imported}
+    exec(compile(text, name, "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+    return module
+
+
+class _Anything:
+    """What a module of the user's may be: it has any name."""
+
+    def __getattr__(self, _: str) -> "_Anything":
+        return self
+
+
+def not_importable(text: str, name: str) -> str:
+    """Return why the emitted Python cannot be imported, whatever the modules of the user's are; "" if it can."""
+    try:
+        loaded(text, name, lambda _: _Anything())
+    except Exception as error:  # noqa: BLE001  # whatever it is, the text is wrong
+        return f"{type(error).__name__}: {error}"
+    return ""
 
 
 NUMBER = count()

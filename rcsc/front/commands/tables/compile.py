@@ -40,8 +40,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     Of a system, given by its system.toml or by the folder that holds it, also the C of the whole: one struct, and a
     function that runs all levels that are due and carries the buffers between them.
 
-    Nothing is written unless everything is proved. Files are replaced whole: a kill leaves the old ones. The
-    same tables give the same bytes on every machine, so the files belong in version control.
+    Nothing is written unless everything is proved, and what was made can be used: the Python is imported, the C compiled where there
+    is a compiler. Files are replaced whole: a kill leaves the old ones. The same tables give the same bytes on every machine, so the
+    files belong in version control.
     """
     targets = tuple(name.strip() for name in target.split(",") if name.strip())
     if not targets or not set(targets) <= TARGETS.keys():
