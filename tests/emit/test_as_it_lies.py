@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.code.emit import emitted
 from rcsc.code.testing.apart import Ended, apart
 from rcsc.driver import compile as driver
 from rcsc.driver.settings import silent
@@ -153,7 +154,7 @@ def test_what_cannot_be_imported_or_compiled_is_not_written(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """An emitter that errs; the user's module, which is not there, is none of its business."""
-    made, look = driver.emitted, 'extern procedure look writes left python "x.y:f" c "f"'
+    made, look = emitted, 'extern procedure look writes left python "x.y:f" c "f"'
     monkeypatch.setattr(
         driver,
         "emitted",

@@ -156,10 +156,10 @@ READERS = (
     "rcsc/code/emit/rendering.py:",
     "rcsc/code/testing/executors/python.py:",
     "rcsc/code/testing/executors/externs.py:",
-    "rcsc/lang/syntax/lalr.py:",
+    "rcsc/lang/syntax/saved.py:",
 )
 """Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now, marks
-were written by who reads them, and the tables of the grammar come with the compiler."""
+were written by who reads them, and the parser of the grammar comes with the compiler."""
 
 
 def test_only_the_bounded_readers_parse_text_from_outside() -> None:

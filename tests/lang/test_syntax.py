@@ -20,9 +20,9 @@ from rcsc.lang.digest import Digests
 from rcsc.lang.syntax import layout, tree
 from rcsc.lang.syntax import parse as parsing
 from rcsc.lang.syntax.format import format_file
-from rcsc.lang.syntax.lalr import ParseNode, Tables, grammar_of_json
-from rcsc.lang.syntax.parse import MOST_ERRORS, made_tables, parse
+from rcsc.lang.syntax.parse import MOST_ERRORS, ParseNode, parse
 from rcsc.lang.syntax.rows import PIECES, Side
+from rcsc.lang.syntax.saved import saved
 from rcsc.lang.syntax.spell import spell_expr
 from rcsc.proof.solvers.options import Options
 from tests.bench.made import families
@@ -456,30 +456,31 @@ def test_values_and_variables_called_like_words_stay_what_they_are() -> None:
     assert [heading.word for heading in (*table.conditions, *table.actions)] == ["", "", "when", ""]
 
 
-def by_lark(found: Any) -> object:
+def plain(found: Any) -> object:
     """A tree of Lark's as plain data: names, texts and places."""
     if isinstance(found, lark.Token):
         return found.type, str(found), found.start_pos, found.end_pos
     place = (-1, -1) if found.meta.empty else (found.meta.start_pos, found.meta.end_pos)
-    return str(found.data), place, [by_lark(child) for child in found.children]
+    return str(found.data), place, [plain(child) for child in found.children]
 
 
-def by_tables(found: Any) -> object:
-    """A tree of ours likewise."""
-    if isinstance(found, ParseNode):
-        return found.data, (found.start_pos, found.end_pos), [by_tables(child) for child in found.children]
-    return found.type, str(found), found.start_pos, found.end_pos
+def outcome(parser: lark.Lark, text: str, start: str) -> tuple[Any, ...]:
+    """The tree, or where the parser stops and what it would have taken there."""
+    try:
+        return ("a tree", plain(parser.parse(text, start=start)))
+    except lark.UnexpectedToken as error:
+        return error.pos_in_stream, error.token.type, sorted(error.accepts or error.expected)
+    except lark.UnexpectedCharacters as error:
+        return error.pos_in_stream, sorted(error.allowed or ())
 
 
-def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them() -> None:
-    grammar = (REPO / "grammar" / "rcs.lark").read_text(encoding="utf-8")
-    starts = ["file", "cell", "when", "heading", "actions"]
-    parser = lark.Lark(grammar, parser="lalr", start=starts, propagate_positions=True)
-    kept = (REPO / "grammar" / "rcs.tables.json").read_text(encoding="utf-8")
-    tables, rng = Tables(grammar_of_json(kept)), Random(20261122)  # noqa: S311  # texts to try
+def test_the_saved_parser_is_the_one_that_lark_makes() -> None:
+    """Of whole texts, pieces of them, and texts with a slip."""
+    made, kept = parsing.made(), parsing._parser()
+    starts, rng = made.options.start, Random(20261122)  # noqa: S311  # texts to try
     texts = [path.read_text(encoding="utf-8") for path in SHIPPED]
     asked = [(text, "file") for text in texts]
-    for _ in range(400):  # pieces of texts, and texts with a slip
+    for _ in range(400):
         text = rng.choice(texts)
         at = rng.randrange(len(text))
         asked += [(text[at : at + rng.randrange(60)], start) for start in starts]
@@ -489,27 +490,23 @@ def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them()
         asked.append((text[max(0, at - 300) : at] + slip + text[at + rng.randrange(5) : at + 300], "file"))
     right = 0
     for text, start in asked:
-        try:
-            wanted = by_lark(parser.parse(text, start=start))
-        except lark.UnexpectedInput:
-            wanted = None
-        found = tables.parse(text, start)
-        assert (None if found is None else by_tables(found)) == wanted, (start, text)
-        right += found is not None
+        found = outcome(kept, text, start)
+        assert found == outcome(made, text, start), (start, text)
+        right += found[0] == "a tree"
     assert 100 < right < len(asked) - 500
 
 
-def test_the_kept_tables_are_what_lark_makes_of_the_grammar() -> None:
-    kept = (REPO / "grammar" / "rcs.tables.json").read_text(encoding="utf-8")
-    assert kept == made_tables().to_json(), "make them anew: python -m rcsc.lang.syntax.parse"
+def test_the_kept_parser_is_of_the_grammar() -> None:
+    kept = (REPO / "grammar" / "rcs.parser.json").read_text(encoding="utf-8")
+    assert kept == saved(parsing.made(), parsing._digest()), "make it anew: python -m rcsc.lang.syntax.parse"
 
 
 LARK_COUNTED = """
 import lark
 from rcsc.base.diagnostics.source import Source
 from rcsc.lang.syntax import parse as module
-made, whole = [], lark.Lark
-lark.Lark = lambda *args, **options: made.append(args) or whole(*args, **options)
+made, whole = [], lark.Lark.__init__
+lark.Lark.__init__ = lambda *args, **options: made.append(args) or whole(*args, **options)
 {before}
 tree = module.parse(Source("a.rcs", {text!r}))
 print(len(made), type(tree).__name__)
@@ -521,16 +518,12 @@ RIGHT = "input a : bool\ntable t {\n| line | a ||\n|---|---||\n| 1 | - ||\n}\n"
     ("text", "before", "printed"),
     [
         (RIGHT, "", "0 File"),
-        ("input a : : bool\n", "", "1 tuple"),
+        ("input a : : bool\n", "", "0 tuple"),
         (RIGHT, "module._grammar_text = lambda of=module._grammar_text(): of + '\\n'", "1 File"),
     ],
-    ids=[
-        "a right text needs no Lark",
-        "Lark says what is wrong",
-        "another grammar is not taken for this one",
-    ],
+    ids=["a right text", "a wrong one", "the parser of another grammar is not taken for this one's"],
 )
-def test_lark_is_asked_only_where_it_must_be(text: str, before: str, printed: str) -> None:
+def test_lark_makes_a_parser_only_of_another_grammar(text: str, before: str, printed: str) -> None:
     program = LARK_COUNTED.format(text=text, before=before)
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == printed
@@ -617,13 +610,13 @@ def flat(places: object) -> Iterator[Span]:
 
 def test_each_condition_is_parsed_once_though_many_lines_join_it(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    plain = Tables.parse
+    parsed = parsing._parsed
 
-    def counted(tables: Tables, text: str, start: str) -> ParseNode | None:
+    def counted(text: str, start: str) -> ParseNode:
         asked.append(text)
-        return plain(tables, text, start)
+        return parsed(text, start)
 
-    monkeypatch.setattr(Tables, "parse", counted)
+    monkeypatch.setattr(parsing, "_parsed", counted)
     text = families.linear(64, 6, 3)
     assert isinstance(parse(Source("counted.rcs", text)), tree.File)
     cells = [row.split("|")[2].strip() for row in text.splitlines() if re.match(r"\| \d", row)]

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from rcsc.base.diagnostics.codes import Code
+from rcsc.code.emit import TARGETS
 from rcsc.driver import compile as compiling
 from rcsc.driver import settings, trials
-from rcsc.driver.compile import tables_in
+from rcsc.driver.compile import generated_of, tables_in
 from rcsc.driver.pipeline import proved
 from rcsc.front.commands import run
 from rcsc.proof.solvers.options import Options
@@ -23,7 +24,10 @@ def beside_python(path: Path) -> tuple[list[tuple[Code, str]], str]:
     given = (str(path),)
     project = proved(settings.Settings(tables_in(given, (path,)), Options()))
     diagnostics, figure = trials._beside(
-        path, trials._generated(path, project, False), settings.TestEffort(60), settings.silent
+        path,
+        generated_of(project, (path,), TARGETS, defensive=False),
+        settings.TestEffort(60),
+        settings.silent,
     )
     return [(found.code, found.message) for found in diagnostics], figure
 

@@ -19,11 +19,11 @@ A text that is wrong is diagnostics, never an exception, and reading goes on aft
 >>> [diagnostic.code.value for diagnostic in parse(Source("a.rcs", "const = 3\nconst = 4\n"))]
 ['RCS101', 'RCS101']
 
-Trusted: the grammar and `build`, for what a text says. Lark makes the tables of the grammar once; `lalr` runs them in
-a third of Lark's time and is held against Lark by tests. Reading takes time linear in the text.
+Trusted: the grammar and `build`, for what a text says. Lark parses; what it makes of the grammar is kept (`saved`), and held by tests to
+what it makes anew. Reading takes time linear in the text.
 
 Modules, in the order the data flows: `screen` refuses what is no text of the language, `rows` cuts tables into parts, lines and cells,
-`parse` reads (with `lalr`) and says by `expected` what it expected, `build` makes the `tree`, `comments` puts
+`parse` reads (with Lark, `saved`) and says by `expected` what it expected, `build` makes the `tree`, `comments` puts
 comments to their nodes; `turned` makes lines of tables that are printed the other way round; `format` lays a tree out
 again, `layout` its tables, `spell` its expressions.
 """

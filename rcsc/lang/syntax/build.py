@@ -8,13 +8,22 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.comments import Comments, split, words
-from rcsc.lang.syntax.lalr import ParseNode
 
 _NUMBER_TYPES: dict[str, type[tree.IntType | tree.RealType | tree.SingleType]] = {
     "int_type": tree.IntType,
     "real_type": tree.RealType,
     "single_type": tree.SingleType,
 }
+
+
+class ParseNode(Protocol):
+    """A rule's name, what it matched (nodes and tokens), and in `meta` where, if it matched anything."""
+
+    data: str
+    children: list[Any]
+
+    @property
+    def meta(self) -> Any: ...
 
 
 class Rows(Protocol):
@@ -42,9 +51,12 @@ class Build:
     # --- pieces ---
 
     def _span(self, node: ParseNode) -> Span:
-        if node.start_pos < 0:
-            return Span(self.file, 0, 0)
-        return Span(self.file, node.start_pos, node.end_pos)
+        at: Any = getattr(node, "meta", node)  # a token stands somewhere itself
+        return (
+            Span(self.file, 0, 0)
+            if getattr(at, "empty", False)
+            else Span(self.file, at.start_pos, at.end_pos)
+        )
 
     def _name(self, token: Any) -> tree.Name:
         return tree.Name(str(token), Span(self.file, token.start_pos, token.end_pos))
@@ -54,7 +66,7 @@ class Build:
 
     def _head(self, node: ParseNode) -> dict[str, Any]:
         """Return span, comments and doc lines of a declaration."""
-        plain, doc = split(self.comments.take(node.start_pos))
+        plain, doc = split(self.comments.take(node.meta.start_pos))
         return {"span": self._span(node), "comments": plain, "doc": doc}
 
     def _quoted(self, node: ParseNode | None) -> tuple[tree.Name, ...]:
@@ -71,12 +83,12 @@ class Build:
 
     def _above(self, node: ParseNode) -> dict[str, Any]:
         """Return span and comments of a statement or an arm."""
-        comments = self.comments.take(node.start_pos)
+        comments = self.comments.take(node.meta.start_pos)
         return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
 
     @staticmethod
     def _rule(item: Any) -> str:
-        return item.data if isinstance(item, ParseNode) else ""
+        return str(getattr(item, "data", ""))  # a token has none
 
     def _find(self, items: list[Any], rule: str) -> Any:
         return next((item for item in items if self._rule(item) == rule), None)
@@ -227,8 +239,8 @@ class Build:
         name = self._name(node.children[0])
         if giving is None:
             return tree.TableDecl(name, assuming, *self.rows.table(rows), **head)
-        subject = None if by is None else (by.start_pos + len("by"), by.end_pos)
-        given = giving.start_pos + len("giving"), giving.end_pos
+        subject = None if by is None else (by.meta.start_pos + len("by"), by.meta.end_pos)
+        given = giving.meta.start_pos + len("giving"), giving.meta.end_pos
         return tree.TableDecl(name, assuming, *self.rows.turned(rows, subject, given), **head)
 
     def _link_decl(self, node: ParseNode) -> tree.LinkDecl:
@@ -345,8 +357,8 @@ class Build:
         node = self._find(items, "unit")
         if node is None:
             return None
-        product, *divisors = [item for item in node.children if isinstance(item, ParseNode)]
-        factors = [self._factor(f, 1) for f in product.children if isinstance(f, ParseNode)]
+        product, *divisors = [item for item in node.children if self._rule(item)]
+        factors = [self._factor(f, 1) for f in product.children if self._rule(f)]
         factors += [self._factor(f, -1) for f in divisors]
         return tree.Unit(tuple(factor for factor in factors if factor is not None), self._span(node))
 
@@ -402,7 +414,7 @@ class Build:
         return tree.Mask("_".join(token.lower().split()), span)
 
     def _member(self, node: Any) -> tree.Member:
-        if not isinstance(node, ParseNode):
+        if not self._rule(node):
             return self._groups(node, self._span(node))
         if node.data != "range":
             return self.expr(node)
@@ -466,7 +478,7 @@ class Build:
             case "requirements":
                 return self._quoted(node)
             case "actions":
-                return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
+                return tuple(self.statement(item) for item in node.children if self._rule(item))
             case _:
                 return self.expr(part)
 
@@ -483,7 +495,7 @@ class Build:
             within = self._span(value)
             return tree.Lasting(tree.Comparison("=", self.expr(value), within), self.expr(time), span)
         last = parts[-1] if node.data == "listed" else None
-        if isinstance(last, ParseNode) and last.data == "lasts":  # of the whole list
+        if last is not None and self._rule(last) == "lasts":  # of the whole list
             value, *_, time = last.children
             members = self._members([*parts[:-1], value])
             return tree.Lasting(tree.OneOf(members, span), self.expr(time), span)
@@ -530,7 +542,7 @@ class Build:
 
     def block(self, node: ParseNode) -> tuple[tree.Statement, ...]:
         """Build the statements between braces."""
-        return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
+        return tuple(self.statement(item) for item in node.children if self._rule(item))
 
     def statement(self, node: ParseNode) -> tree.Statement:
         """Build any statement."""

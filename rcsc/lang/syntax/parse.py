@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import lark
 
@@ -20,7 +20,6 @@ from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
 from rcsc.lang.syntax.expected import ELSEWHERE, expected, missing_word, operator_meant, word_meant
-from rcsc.lang.syntax.lalr import Grammar, ParseLeaf, ParseNode, Tables, grammar_of_json, grammar_of_lark
 from rcsc.lang.syntax.rows import (
     ACTION_WORDS,
     BITS,
@@ -55,6 +54,7 @@ from rcsc.lang.syntax.rows import (
     parts,
     stub_of,
 )
+from rcsc.lang.syntax.saved import loadable, saved
 from rcsc.lang.syntax.turned import NAMELESS_DEFAULT, NAMES_APART, NOTHING, crossed, heading_of, name_of
 
 MOST_ERRORS = 20
@@ -62,8 +62,10 @@ MOST_CONJUNCTS = 100
 """In one cell, up to which each is parsed by itself: all of them nest less deep than a condition may."""
 
 
-_TABLES = "rcs.tables.json"
-"""Lark's tables of the grammar; `python -m rcsc.lang.syntax.parse` makes them anew after a change of the grammar."""
+_SAVED = "rcs.parser.json"
+"""Lark's parser of the grammar; `python -m rcsc.lang.syntax.parse` makes it anew after a change of the grammar."""
+ParseNode: TypeAlias = lark.Tree[lark.Token]
+ParseLeaf: TypeAlias = lark.Token
 
 
 def _grammar_folder() -> Path:
@@ -79,30 +81,21 @@ def _grammar_text() -> str:
 
 @cache
 def _parser() -> lark.Lark:
-    """Return the LALR parser of the grammar, as Lark makes it: it tells what is wrong with a text."""
-    starts = ["file", "cell", "when", "heading", "requirements", "actions"]
-    return lark.Lark(_grammar_text(), parser="lalr", start=starts)
-
-
-@cache
-def _tables() -> Tables:
-    """Return the tables kept beside the grammar; if they are of an older grammar, have Lark make them."""
-    kept = _grammar_folder() / _TABLES
-    grammar = grammar_of_json(kept.read_text(encoding="utf-8")) if kept.is_file() else None
-    if grammar is None or grammar.of != _digest():
-        grammar = made_tables()
-    return Tables(grammar)
+    """Return the parser that is kept beside the grammar; if it is of an older grammar, have Lark make it."""
+    kept = _grammar_folder() / _SAVED
+    it = loadable(kept.read_text(encoding="utf-8"), _digest()) if kept.is_file() else None
+    return made() if it is None else lark.Lark.load(it)
 
 
 def ready() -> None:
-    """Prepare the parser that reports errors, which takes longer than to parse a hundred correct texts."""
+    """Prepare the parser, which takes longer than to parse a hundred correct texts."""
     _parser()
-    _tables()
 
 
-def made_tables() -> Grammar:
-    """Return the tables of the grammar, made by Lark."""
-    return grammar_of_lark(_parser(), _digest())
+def made() -> lark.Lark:
+    """Return the LALR parser of the grammar, made by Lark."""
+    starts = ["file", "cell", "when", "heading", "requirements", "actions"]
+    return lark.Lark(_grammar_text(), parser="lalr", start=starts, propagate_positions=True)
 
 
 def _digest() -> str:
@@ -115,11 +108,7 @@ def _parsed(text: str, start: str) -> ParseNode:
     Raises:
         lark.UnexpectedInput: The text has no tree.
     """
-    root = _tables().parse(text, start)
-    if root is None:
-        _parser().parse(text, start=start)  # says what is wrong
-        raise AssertionError("Lark takes a text that its tables refuse")
-    return root
+    return _parser().parse(text, start=start)
 
 
 @lru_cache(maxsize=128)  # one run reads a file for each root that uses it, and a shell at each reload
@@ -144,15 +133,20 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
 
 
+def _begin(leaf: ParseLeaf) -> int:
+    assert leaf.start_pos is not None  # as it was read from a text
+    return leaf.start_pos
+
+
 def _deep_in(root: ParseNode) -> tuple[int, int] | None:
     """Return start and end of the first node that lies too deep; where there is none, later stages may recurse at each depth."""
     waiting = [(root, 0)]
     while waiting:
         node, depth = waiting.pop()
         if depth > screen.DEEPEST:
-            return node.start_pos, node.start_pos + 1
+            return node.meta.start_pos, node.meta.start_pos + 1
         deeper = depth + (node.data not in ("block", "arm"))
-        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, ParseNode))
+        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, lark.Tree))
     return None
 
 
@@ -170,7 +164,7 @@ class _Pieces:
         while len(diagnostics) < MOST_ERRORS:
             blank = screen.blank_before(text, offset)
             try:
-                self.nodes.extend(_parsed(blank, "file").children)
+                self.nodes.extend(cast("list[ParseNode]", _parsed(blank, "file").children))
                 return diagnostics
             except lark.UnexpectedInput as error:
                 diagnostics.append(_syntax_error(error, self.source.name, 0, len(text), text))
@@ -468,8 +462,8 @@ class _Rows:
         if named and not STUB.match(stub.text):
             helps = (MARKS,) if " " in stub.text else ()
             self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", stub, *helps)
-        comments = tuple(words(text) for row in rows for text in self.comments.take(row.start_pos))
-        return _Line(rows[0].start_pos, cells.last.ends[1], cells, comments)
+        comments = tuple(words(text) for row in rows for text in self.comments.take(_begin(row)))
+        return _Line(_begin(rows[0]), cells.last.ends[1], cells, comments)
 
     def _whole(self, rows: list[ParseLeaf]) -> Cells | None:
         """Return a row, joined with the rows that go on with it."""
@@ -481,7 +475,7 @@ class _Rows:
             if not self._even(row, more, above, "the row above, with which it goes on,"):
                 return None
             if not any(cell.text for cell in more.all):
-                there = Span(self.source.name, row.start_pos, row.start_pos + len(row.rstrip()))
+                there = Span(self.source.name, _begin(row), _begin(row) + len(row.rstrip()))
                 self.diagnostics.append(_error(Code.GOES_ON, "this row has nothing in it", there, PIECES))
                 return None
             whole = joined(cells, more, above)
@@ -527,7 +521,7 @@ class _Rows:
         return [_over(pieces) for pieces in zip(*read, strict=True)]
 
     def _cut(self, row: ParseLeaf) -> Cells | None:
-        start = row.start_pos
+        start = _begin(row)
         cells = cut(str(row), start, self.source.name)
         if isinstance(cells, str):
             there = Span(self.source.name, start, start + len(row.rstrip()))
@@ -623,7 +617,7 @@ class _Rows:
             ("actions", cells.actions, other.actions),
         ):
             if len(got) != len(want):
-                start = row.start_pos
+                start = _begin(row)
                 begins = NEW_PART if cells.conditions[0].text == "line" else EMPTY_CELL
                 helps = (begins, PARTED) if len(got) > len(want) else (begins,)
                 self.diagnostics.append(
@@ -675,8 +669,11 @@ class _Rows:
 
     def _conjunct(self, text: str) -> tree.Expr | None:
         if ("and", text) not in self.memory:
-            node = _tables().parse(text, "when")
-            if node is None or _deep_in(node):
+            try:
+                node = _parsed(text, "when")
+            except lark.UnexpectedInput:
+                return None
+            if _deep_in(node):
                 return None
             self.memory["and", text] = Build("", _NO_COMMENTS, None).cell(node)
         return cast("tree.Expr", self.memory["and", text])
@@ -718,4 +715,4 @@ class _Rows:
 
 
 if __name__ == "__main__":
-    write_atomically(_grammar_folder() / _TABLES, made_tables().to_json().encode())
+    write_atomically(_grammar_folder() / _SAVED, saved(made(), _digest()).encode())
