@@ -35,7 +35,7 @@ def test_the_wheel_has_the_grammar_the_types_and_all_data(tmp_path: Path) -> Non
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         metadata = archive.read(next(name for name in names if name.endswith("METADATA"))).decode()
-    assert {"rcsc/_data/grammar/rcs.lark", "rcsc/_data/grammar/rcs.tables.json"} <= set(names)
+    assert {"rcsc/_data/grammar/rcs.lark", "rcsc/_data/grammar/rcs.parser.json"} <= set(names)
     assert {"rcsc/py.typed", "rcsc/base/diagnostics/schema/report.schema.json"} <= names
     templates = {path.name for path in (REPO / "rcsc" / "code" / "emit" / "templates").iterdir()}
     assert {
