@@ -67,6 +67,11 @@ def faults_of(outside: Iterable[object]) -> tuple[str, ...]:
     )
 
 
+def grades_of(outside: Iterable[object]) -> dict[str, tuple[float, float]]:
+    """Return the lowest and the highest strength of each fault of the parts outside that has strengths."""
+    return {name: ends for part in outside if isinstance(part, Graded) for name, ends in part.grades.items()}
+
+
 def switch(outside: Iterable[object], fault: str, *, on: bool) -> None:
     """Switch a fault on or off, in every plant that has it.
 

@@ -57,7 +57,7 @@ FORMATS_OF_OURS = {
     "rcsc/code/testing/executors/externs.py", "rcsc/code/testing/coverage/harness.py", "rcsc/lang/operator_table.py",  # reals as bits
     "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
-    "rcsc/run/processes/attach.py", "rcsc/run/log/schema.py",
+    "rcsc/run/processes/attach.py", "rcsc/run/processes/switches.py", "rcsc/run/log/schema.py",
     "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py", "rcsc/run/link/beside.py",
     "rcsc/run/orders/stopped.py", "rcsc/proof/certify", "rcsc/run/campaign/work.py",
 }  # fmt: skip

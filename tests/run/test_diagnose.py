@@ -18,17 +18,20 @@ from rcsc.desk.studio.runs.live import Live, Pace
 from rcsc.front.commands import run
 from rcsc.run.adopt import Begun
 from rcsc.run.description import description
+from rcsc.run.faults import BadStrength, switch
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.replay import Replay
 from rcsc.run.log.schema import Gap, LoggedEvent, event_of
 from rcsc.run.plant.staging import StageOrder
 from rcsc.run.processes import serve
 from rcsc.run.processes.attach import NotAttached, RunningSystem, attach, find, running
+from rcsc.run.processes.block import Block
 from rcsc.run.processes.clocks import Clocks, Turn
 from rcsc.run.processes.diagnose import Watch
 from rcsc.run.processes.memory import SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import Factory, Setting, begin, cycle
 from rcsc.run.processes.supervisor import Course, Supervisor, run_processes
+from rcsc.run.processes.switches import Heeded, Switches
 from rcsc.run.system import assemble, signatures
 from tests.support.processes_outside import ACQUIRE, QUERIES, ROUND, alone, outside, queries
 
@@ -254,7 +257,7 @@ def system(dock: Path, tmp_path: Path) -> Iterator[Supervisor]:
     outside = Factory(
         "rcsc.run.plant.staging:outside", (StageOrder(str(path), script="long"), str(tmp_path / "rows"))
     )
-    course = Course(log=tmp_path / "run.mcap", system=path)
+    course = Course(log=tmp_path / "run.mcap", system=path, faults={"wheel_slips": None})
     with Supervisor(description(path), "python", {"outside": outside}, rate=4.0, course=course) as made:
         until(lambda: (made._clocks.now_ms("drive") or 0) > 80, "it does not run")
         yield made
@@ -319,6 +322,71 @@ def test_a_running_system_is_stepped_set_held_and_let_go(
     assert drive.set_by_hand(drive.restarts[0]) == {"waited": "7"}
     assert [event.what for event in log.events] == []
     assert Replay(log, dock / "generated", "python").first_difference() is None
+
+
+def test_a_fault_of_the_plant_is_switched_by_who_is_attached_and_stays_on(
+    system: Supervisor, tmp_path: Path
+) -> None:
+    found = find(system.buffers.block.name)
+    commands = opened(Opening(found.system, attached=found))
+    session = commands.session
+
+    def rolls() -> bool:
+        """After the ticks in which the plant heeds a switch and the level sees the plant."""
+        commands.do("step 3")
+        before = session.system.level("drive").value("travelled_mm")
+        commands.do("step 3")
+        return session.system.level("drive").value("travelled_mm") != before
+
+    assert commands.do("faults") == ["wheel_slips"]
+    commands.do("order dock")
+    commands.do("run until drive.speed_mm_s > 0")
+    assert rolls()
+    assert commands.do("fault wheel_slips") == ["wheel_slips is on"]
+    assert not rolls()
+    for wrong, why in (("fault wheel_slip", "no plant has a fault"), ("fault wheel_slips=3", "is on or off")):
+        with pytest.raises(Refused, match=why):
+            commands.do(wrong)
+    session.leave()
+    goes_on(system)
+    system.let_go()
+    commands = opened(Opening(found.system, attached=found))
+    session = commands.session
+    assert commands.do("faults") == ["wheel_slips is on"]
+    assert not rolls()
+    commands.do("fault wheel_slips off")
+    assert rolls()
+    session.leave()
+    system.let_go()
+    system.close()
+    log = read(tmp_path / "run.mcap")
+    switched = [event.what for event in log.events if event.what.startswith("fault")]
+    assert switched == ["fault wheel_slips is on", "fault wheel_slips is off"]
+    assert Replay(log, found.system.parent / "generated", "python").first_difference() is None
+
+
+def test_a_switch_thrown_twice_is_heeded_once_a_look_with_its_strength() -> None:
+    block = Block.create(Switches.size(2))
+    try:
+        thrown, seen = (Switches(block, 0, {"late": (0.0, 1e3), "dark": None}) for _ in range(2))
+        switch((thrown,), "dark", on=True)
+        heeded = Heeded(seen)
+        assert list(heeded.thrown()) == []
+        switch((thrown,), "late=0.1", on=True)
+        switch((thrown,), "dark", on=False)
+        switch((thrown,), "dark", on=True)
+        assert list(heeded.thrown()) == [("late=0.10000000000000001", True), ("dark", True)]
+        assert list(heeded.thrown()) == []
+        assert seen.on == {"late", "dark"}
+        switch((thrown,), "late", on=True)
+        assert list(heeded.thrown()) == [("late", True)]
+        for wrong in ("late=1001", "late=x", "dark=1"):
+            with pytest.raises(BadStrength):
+                switch((thrown,), wrong, on=True)
+        assert list(heeded.thrown()) == []
+    finally:
+        block.unlink()
+        block.close()
 
 
 def test_the_studio_lets_it_run_pauses_it_and_lets_it_go(system: Supervisor) -> None:

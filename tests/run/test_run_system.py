@@ -20,6 +20,7 @@ from rcsc.run.orders.operator import ScriptedRun, ScriptOperator
 from rcsc.run.orders.roles import served
 from rcsc.run.orders.script import BadScript, OrderRow, read_script, script_path
 from rcsc.run.plant.staging import StageOrder, staged, standing
+from rcsc.run.processes.supervisor import Course, Supervisor
 from rcsc.run.system import System, assemble, signatures
 from rcsc.views.pages.report import page
 from rcsc.views.pages.witness import RunWitness
@@ -180,6 +181,22 @@ def test_processes_run_for_so_many_cycles(here: Path, capsys: pytest.CaptureFixt
     assert run([*quick, "step.mcap", "--processes", "--in-step", "--rate", "20"]) == 0
     assert run([*quick, "one.mcap"]) == 0
     assert Path("step.mcap").read_bytes() == Path("one.mcap").read_bytes()
+
+
+@pytest.mark.usefixtures("here")
+def test_who_attaches_learns_which_faults_the_plant_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    courses: list[Course] = []
+    kept = "rcsc.front.commands.systems.run.run_processes"
+    monkeypatch.setattr(kept, lambda *_, course, **__: courses.append(course))
+    quick = ["run", "dock", "--no-compile", "-q", "--processes", "--fault", "wheel_slips"]
+    assert run([*quick, "--cycles", "7"]) == 1  # no row ended
+    [course] = courses
+    assert (course.faults, course.on) == ({"wheel_slips": None}, ("wheel_slips",))
+    system = Supervisor(description(Path("dock/system.toml")), "python", {}, course=course)
+    try:
+        assert system._heeded.switches.on == {"wheel_slips"}
+    finally:
+        system.close()
 
 
 def test_what_is_wrong_is_told_before_a_process_is_begun(

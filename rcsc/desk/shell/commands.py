@@ -72,6 +72,9 @@ diff [LEVEL]            the same, but take nothing
 expect CONDITION        fail unless it holds
 clear                   clear the screen; a module that is called so runs as CLEAR or LEVEL.clear
 help, quit
+Of a system in processes (`rcsc shell --attach`) all of this but `undo`, `reload`, `restart`, `freeze` and `thaw`: those are of one
+process. It goes on when you quit, at its own rate, and a fault that is on stays on. A level whose process is killed, or stands still,
+is started again by itself, from what its last cycle left, or anew where that is lost.
 A CONDITION compares variables: task.cur_state = state_3 and not (new_command or primitive.travelled_mm > 40).
 Everything from # on is a comment."""
 
@@ -157,7 +160,7 @@ class Commands:
 
     def _faults(self, _rest: str) -> Output:
         on = self.session.faults
-        every = faults_of(self.session.system.outside)
+        every = faults_of(self.session.plants)
         return [f"{name} is on" if name in on else name for name in every] or ["no plant has any"]
 
     def _fault(self, rest: str) -> Output:

@@ -65,7 +65,7 @@ class Session:
         self.chosen = system.levels[0].name
         self.stops = Stops()
         self.interrupted = False
-        self.faults: frozenset[str] = frozenset()
+        self.faults = frozenset[str]() if self.attached is None else self.attached.switches.on
         self.changes = 0
         self.between: Callable[[], None] = lambda: None
         self._log: Recorder | None = None
@@ -89,6 +89,11 @@ class Session:
     def levels(self) -> tuple[RunningLevel, ...]:
         """From the top down."""
         return self.system.levels
+
+    @property
+    def plants(self) -> tuple[object, ...]:
+        """What has faults to be switched: what stands outside, or the switches of it."""
+        return self.system.outside if self.attached is None else (self.attached.switches,)
 
     @property
     def level(self) -> RunningLevel:
@@ -138,10 +143,11 @@ class Session:
         except StateTableError as error:
             raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
 
-    def _here(self, what: str) -> None:
+    def _here(self, what: str, instead: str = "`rcsc shell SYSTEM` does it, in one process") -> None:
         """Raises: Refused: The system runs in other processes, where nobody does that."""
         if self.attached is not None:
-            raise Refused(Code.SHELL_COMMAND, f"what runs in processes of its own is not {what} from here")
+            message = f"what runs in processes of its own is not {what} from here"
+            raise Refused(Code.SHELL_COMMAND, message, instead)
 
     def hold(self, name: str, *, on: bool) -> str:
         """Have a level skip its cycles while the rest of an attached system goes on, or no more.
@@ -261,7 +267,9 @@ class Session:
         Raises:
             Refused: Its tables are not proved for that state.
         """
-        self._here("started again")
+        self._here(
+            "started again", "a level whose process is killed, or stands still, is started again by itself"
+        )
         level = self.system.level(name)
         checkpoint = None if anew else level.values
         self._keep()
@@ -279,7 +287,7 @@ class Session:
             Refused: No plant has it, or not that strength.
         """
         try:
-            switch(self.system.outside, name, on=on)
+            switch(self.plants, name, on=on)
         except (BadStrength, UnknownFault) as error:
             raise Refused(Code.SHELL_COMMAND, str(error), *error.helps) from error
         plain = name.partition("=")[0]

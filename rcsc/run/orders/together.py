@@ -13,7 +13,7 @@ from typing import Any
 
 from rcsc.base.host.files.names import shown
 from rcsc.base.host.files.plain import read
-from rcsc.run.faults import Graded, faults_of, switch
+from rcsc.run.faults import faults_of, grades_of, switch
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.operator import Operator, ScriptOperator
 from rcsc.run.orders.stopped import Restorable
@@ -149,12 +149,7 @@ class Together:
     @property
     def grades(self) -> Mapping[str, tuple[float, float]]:
         """The strengths of the plants' faults."""
-        return {
-            name: ends
-            for part in self.others
-            if isinstance(part, Graded)
-            for name, ends in part.grades.items()
-        }
+        return grades_of(self.others)
 
     def grade(self, fault: str, strength: float) -> None:
         """Switch a fault on, with a strength."""

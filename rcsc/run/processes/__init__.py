@@ -23,6 +23,7 @@ Processes run by the clock, and on a machine that is too busy for that they run 
 cycle while another is more than a period behind.
 
 Modules, in the order the data flows: `block` is shared memory that is cleared away, `memory` the buffers in it,
-`clocks` how far each process has come, `serve` runs one level or one thing outside, `diagnose` records them all, `attach`
-is for who looks at them and sets what they hold, `supervisor` begins them, watches their pulse and stops them.
+`clocks` how far each process has come, `switches` the faults of plants that somebody switches, `serve` runs one level or one thing
+outside, `diagnose` records them all, `attach` is for who looks at them and sets what they hold, `supervisor` begins them, watches their
+pulse and stops them.
 """

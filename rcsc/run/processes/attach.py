@@ -6,6 +6,7 @@ In: a block whose end says what runs in it. Out: an `AttachedSystem`, which is s
     system = attach(find("dock"), "python", {})
     system.step()                           # one tick of all processes
     system.hold("drive", on=True)           # it skips its cycles, and the rest goes on
+    system.switches.switch("wheel_slips", on=True)   # a fault of its plant, from the next tick on
     system.leave()                          # all go on as before
 
 What is set is sent to the level, which takes it between two cycles, and so it is in the log; nobody writes in what is a level's own. One is
@@ -31,6 +32,7 @@ from rcsc.run.log.schema import fingerprints
 from rcsc.run.processes.block import FOLDER, PREFIX, Block
 from rcsc.run.processes.clocks import LONGEST_NAP_S, SHORTEST_NAP_S, Clocks
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
+from rcsc.run.processes.switches import Strengths, Switches
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, System, assemble, signatures
 
@@ -57,6 +59,7 @@ class RunningSystem:
         system: Path of the description.
         outside: Names of the processes outside the levels.
         programs: Digests of what was generated for its programs.
+        faults: Of its plants.
     """
 
     block: str
@@ -66,6 +69,7 @@ class RunningSystem:
     programs: Mapping[str, str]
     rate: float
     in_step: bool
+    faults: Strengths = field(default_factory=dict)
 
     def text(self) -> bytes:
         """Return it as the end of a block.
@@ -76,6 +80,7 @@ class RunningSystem:
         fields = {
             "name": self.name, "system": str(self.system), "outside": list(self.outside),
             "programs": dict(self.programs), "rate": self.rate, "in_step": self.in_step,
+            "faults": dict(self.faults),
         }  # fmt: skip
         written = json.dumps(fields).encode()
         if len(written) > NOTE:
@@ -86,6 +91,10 @@ class RunningSystem:
         """Return the clocks of its processes."""
         outside = dict.fromkeys(self.outside, description(self.system).tick_ms)
         return Clocks(buffers.block, buffers.layout.size, outside | dict(periods_ms), self.in_step)
+
+    def switches(self, buffers: SharedMemoryBuffers, levels: int) -> Switches:
+        """Return the switches of its plants' faults."""
+        return Switches.behind(buffers, len(self.outside) + levels, self.faults)
 
 
 def running() -> list[RunningSystem]:
@@ -110,6 +119,7 @@ def _read(path: Path) -> RunningSystem:
         path.name, checked.text("name"), Path(checked.text("system")), tuple(map(str, fields["outside"])),
         {str(name): str(digest) for name, digest in fields["programs"].items()}, float(fields["rate"]),
         bool(fields["in_step"]),
+        {str(name): ends and (float(ends[0]), float(ends[1])) for name, ends in fields["faults"].items()},
     )  # fmt: skip
 
 
@@ -199,9 +209,14 @@ class Link:
 
 @dataclass(slots=True)
 class AttachedSystem(System):
-    """A system that runs in other processes, as one that is stepped here."""
+    """A system that runs in other processes, as one that is stepped here.
+
+    Attributes:
+        switches: Of its plants' faults; what is thrown stays so when who is attached goes.
+    """
 
     link: Link = field(kw_only=True)
+    switches: Switches = field(kw_only=True)
     _known: dict[str, Values] = field(default_factory=dict)
     _sent: dict[str, dict[int, object]] = field(default_factory=dict)
 
@@ -315,7 +330,8 @@ def attach(found: RunningSystem, kind: Kind, queries: Mapping[str, Query]) -> At
     memory = SharedMemoryBuffers(Block.attach(found.block), layout(here, signs))
     clocks = found.clocks(memory, periods(here, local))
     clocks.attach(os.getpid())
-    system = AttachedSystem(here, local.levels, (), link=Link(found, memory, clocks, lock))
+    thrown = found.switches(memory, len(signs))
+    system = AttachedSystem(here, local.levels, (), link=Link(found, memory, clocks, lock), switches=thrown)
     try:
         system.begin()
     except BaseException:

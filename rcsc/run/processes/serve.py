@@ -17,9 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from rcsc.run.adopt import Begun, restart
 from rcsc.run.description import Description
+from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
 from rcsc.run.processes.clocks import Clocks, Turn
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout, mail
+from rcsc.run.processes.switches import Heeded, Strengths, Switches
 from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import Kind, Outside, executors, signatures
 
@@ -63,6 +65,7 @@ class Setting:
         kind: Of the executors; each level's process builds its own.
         block: Name of the shared memory.
         periods_ms: Of each process, by its name.
+        faults: Of the plants, that somebody may switch from elsewhere.
     """
 
     description: Description
@@ -73,10 +76,15 @@ class Setting:
     parent: int
     periods_ms: Mapping[str, int]
     in_step: bool = False
+    faults: Strengths = field(default_factory=dict)
 
     def clocks(self, buffers: SharedMemoryBuffers) -> Clocks:
         """Return the clocks of all processes, behind the buffers."""
         return Clocks(buffers.block, buffers.layout.size, self.periods_ms, self.in_step)
+
+    def switches(self, buffers: SharedMemoryBuffers) -> Switches:
+        """Return the switches of the plants' faults, behind the clocks."""
+        return Switches.behind(buffers, len(self.periods_ms), self.faults)
 
 
 AT_FIRST, REFUSES = 0, 4
@@ -193,7 +201,14 @@ def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connecti
     """Run a process for the parts outside the levels, until one of them says `over`."""
     with telling(told), attached(setting) as (_, transport):
         parts: tuple[Outside, ...] = tuple(factory.make())
-        for tick in _rounds(setting, Turn(setting.clocks(transport), name), transport):
+        heeded, own = Heeded(setting.switches(transport)), frozenset(faults_of(parts))
+
+        def heed() -> None:
+            for fault, on in heeded.thrown():
+                if fault.partition("=")[0] in own:
+                    switch(parts, fault, on=on)
+
+        for tick in _rounds(setting, Turn(setting.clocks(transport), name), transport, heed):
             given = [part.step(tick, transport.latest) for part in parts]
             for buffer, values in ChainMap(*map(dict, reversed(given))).items():  # each once in a cycle
                 _publish(transport, buffer, values)

@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
@@ -22,11 +22,13 @@ from typing import TYPE_CHECKING, Any, Self
 from rcsc.base.host import children
 from rcsc.run.description import Description
 from rcsc.run.executors import refuse_unproved
+from rcsc.run.faults import switch
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.processes.attach import RunningSystem, is_held
 from rcsc.run.processes.clocks import Clocks
 from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
+from rcsc.run.processes.switches import Heeded, Strengths, Switches
 from rcsc.run.system import Kind, StateTableError, signatures
 
 if TYPE_CHECKING:
@@ -51,12 +53,16 @@ class Course:
         log: Where a diagnostic process records every cycle; None for no such process.
         most: Ticks after which all stand; None for no such number.
         system: Path of the description, by which others attach; None where nobody is to.
+        faults: Of the plants, that who attaches may switch.
+        on: Those of them that are on from the first tick, as `rcsc.run.faults.switch` takes them.
     """
 
     in_step: bool = False
     log: Path | None = None
     most: int | None = None
     system: Path | None = None
+    faults: Strengths = field(default_factory=dict)
+    on: tuple[str, ...] = ()
 
 
 COURSE = Course()
@@ -123,11 +129,17 @@ class Supervisor:
         }
         self._attached, self._closed = 0, False
         note = _note(description, tuple(outside), rate, course)
-        self.buffers = SharedMemoryBuffers.create(laid, Clocks.size(len(periods_ms)) + len(note))
-        self.buffers.block.write(laid.size + Clocks.size(len(periods_ms)), note)
+        behind = Clocks.size(len(periods_ms)) + Switches.size(len(course.faults))
+        self.buffers = SharedMemoryBuffers.create(laid, behind + len(note))
+        self.buffers.block.write(laid.size + behind, note)
         self._setting = Setting(
-            description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms, course.in_step
-        )
+            description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms, course.in_step,
+            course.faults,
+        )  # fmt: skip
+        switches = self._setting.switches(self.buffers)
+        for fault in course.on:
+            switch((switches,), fault, on=True)
+        self._heeded = Heeded(switches)
         self._clocks, self._log = self._setting.clocks(self.buffers), course.log
         if course.most is not None:
             self._clocks.stop_at(course.most * description.tick_ms)
@@ -197,7 +209,7 @@ class Supervisor:
         return any(self.code(name) == 0 for name in self._outside) or self._at_end
 
     def let_go(self) -> None:
-        """Let all go on where who was attached has died; have the log say who comes and goes."""
+        """Let all go on where who was attached has died; have the log say who comes and goes, and which faults are switched."""
         name, now = self.buffers.block.name, self._clocks.attached
         if now and not is_held(name):
             self._clocks.let_go()
@@ -205,6 +217,8 @@ class Supervisor:
         if now != self._attached:
             self.note("", "somebody is attached" if now else "nobody is attached any more")
             self._attached = now
+        for fault, on in self._heeded.thrown():
+            self.note("", f"fault {fault} is {'on' if on else 'off'}")
 
     @property
     def _at_end(self) -> bool:
@@ -354,7 +368,7 @@ def _note(description: Description, outside: tuple[str, ...], rate: float, cours
         return b""
     path = course.system.resolve()
     found = RunningSystem(
-        "", description.name, path, outside, fingerprints(description), rate, course.in_step
+        "", description.name, path, outside, fingerprints(description), rate, course.in_step, course.faults
     )
     return found.text()
 

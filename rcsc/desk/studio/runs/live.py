@@ -235,7 +235,7 @@ class Live(Concern):
             "levels": [_level(level) for level in session.levels],
             "chosen": session.chosen,
             "breaks": [{"number": stop.number, "text": stop.text} for stop in session.stops.every],
-            "faults": [{"name": name, "on": name in session.faults} for name in faults_of(system.outside)],
+            "faults": [{"name": name, "on": name in session.faults} for name in faults_of(session.plants)],
             "buffers": [
                 {"name": wire.source, "to": wire.target, "frozen": wire.source in session.memory.frozen}
                 for wire in system.description.wires

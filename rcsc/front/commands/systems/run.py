@@ -22,12 +22,14 @@ from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLA
 from rcsc.front.commands.systems.studio import serve
 from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription, Description, description
+from rcsc.run.faults import faults_of, grades_of
 from rcsc.run.orders.operator import MOST_TICKS, UNORDERED_TICKS, WATCHED_RATE, Operator, ScriptedRun
 from rcsc.run.orders.script import BadScript
 from rcsc.run.orders.stopped import NotKept, StoppedRuns
 from rcsc.run.plant.staging import StageOrder, staged, standing
 from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Course, Supervisor, run_processes
+from rcsc.run.processes.switches import Strengths
 from rcsc.run.signature import Signature
 from rcsc.run.system import assemble, signatures
 from rcsc.views.pages.report import Figure, ReportRow, Story, report
@@ -325,14 +327,15 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
     from rcsc.run.log.recorder import Recorder  # noqa: F401  # of an extra: told before a process is begun
 
     system = description(asked.path)
-    rows = _checked_apart(asked, system, signatures(system), from_row)
+    rows, faults = _checked_apart(asked, system, from_row)
     log = _log_path(asked, system)
     with _writable(log):
         if log.is_file() or not log.exists():
             log.touch()
     begun = time.perf_counter()
     with scratch("run") as folder:
-        ends = _rows_apart(asked, system, (from_row or 1) - 1, folder / "results", log)
+        course = Course(asked.in_step, log, asked.most, asked.path, faults, asked.order.faults)
+        ends = _rows_apart(asked, system, course, (from_row or 1) - 1, folder / "results")
     _recorded_apart(asked, system, ends, log, time.perf_counter() - begun)
     if ends and ends[-1][2] != "done":
         number, text, state, reason, _ = ends[-1]
@@ -371,24 +374,24 @@ def _recorded_apart(
         click.echo(_files(asked, log))
 
 
-def _checked_apart(
-    asked: RunOptions, system: Description, signs: dict[str, Signature], from_row: int | None
-) -> int:
-    """Return the number of rows; report errors of plant and script before a process is begun."""
-    stage: Staged = staged(asked.order, system, signs)
+def _checked_apart(asked: RunOptions, system: Description, from_row: int | None) -> tuple[int, Strengths]:
+    """Return the number of rows, and the plant's faults; report errors of plant and script before a process is begun."""
+    stage: Staged = staged(asked.order, system, signatures(system))
+    grades = grades_of(stage.outside)
+    faults = {name: grades.get(name) for name in faults_of(stage.outside)}
     if stage.operator is None and asked.most is not None:
-        return 0
+        return 0, faults
     if stage.operator is None:
         raise Stopped(
             Code.BAD_SCRIPT,
             "processes run until a script ends, and none is named",
             "`--script FILE` names one, `--cycles N` ends them after so many cycles",
         )
-    return _check_row(stage.operator, from_row)
+    return _check_row(stage.operator, from_row), faults
 
 
 def _rows_apart(
-    asked: RunOptions, system: Description, first: int, results: Path, log: Path
+    asked: RunOptions, system: Description, course: Course, first: int, results: Path
 ) -> list[list[Any]]:
     """Run the processes to the end; return each row's number, text, state, reason and ticks, which travel through `results`."""
     outside = Factory("rcsc.run.plant.staging:outside", (asked.order, str(results), first))
@@ -410,7 +413,7 @@ def _rows_apart(
     results.touch()
     run_processes(
         system, asked.kind, {"outside": outside}, queries=queries, rate=rate,
-        course=Course(asked.in_step, log, asked.most, asked.path), watch=show,
+        course=course, watch=show,
     )  # fmt: skip
     show()
     return rows
