@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from rcsc.run.description import description
+from rcsc.run.log.queries import normal
 from rcsc.run.signature import FORMATS
 from rcsc.run.system import signatures
+from tests.support.shells import alone, do
 
 REPO = Path(__file__).parents[2]
 TABLES = REPO / "tables"
@@ -77,6 +79,19 @@ def test_each_name_on_the_page_stands_in_the_programs(page: str) -> None:
     for entry in rows(page, "where | the paper | here | why"):
         for name in re.findall(r"`([^`]+)`", " ".join(entry)):
             assert name.startswith("rcsc ") or name in TYPED or known.issuperset(name.split()), name
+
+
+def test_what_the_page_says_to_type_is_understood(page: str) -> None:
+    """At TASK: a variable, or a command; and it is called otherwise in the paper."""
+    shell = alone(kind="python")
+    named = list(rows(page, "there | here, at level TASK"))
+    assert len(named) > 15
+    for there, here in named:
+        [typed] = re.findall(r"`([^`]+)`", here)
+        assert normal(typed) not in map(normal, re.findall(r"\*([^*]+)\*", there))
+        variable = typed in {leaf.name for leaf in shell.session.system.level("task").sign.leaves}
+        assert do(shell, f"{typed} ?" if variable else typed), typed
+    assert do(shell, "<CMD=>FAILURE>", "<to-workstation.failure ?>") == ["task.to_workstation.failure = cmd"]
 
 
 def of_buffer(page: str, buffer: str) -> tuple[str, list[list[str]]]:

@@ -286,6 +286,10 @@ def test_an_unknown_name_comes_with_those_near_it(shell: Commands) -> None:
     assert "near it: gripper" in refused(shell, "level griper").helps[0]
     assert "near it: remove_from_buffer_db" in refused(shell, "remove-from-buffer").helps[0]
     assert "`cur_state ?`" in refused(shell, "cur_state").helps[0]
+    assert "`cur_state ?`" in refused(shell, "cur_state => state_4").helps[0]
+    fields = "`to_workstation.failure`, `from_emove.failure`, `emove.failure`"
+    assert refused(shell, "FAILURE ?").helps == (f"fields of that name: {fields}",)
+    assert str(refused(shell, "pickup")) == "`pickup` takes 1 argument: then"
     assert "its parts: workstation.inc_command" in refused(shell, "workstation = pause").helps[0]
 
 

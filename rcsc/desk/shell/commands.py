@@ -26,7 +26,9 @@ from rcsc.views.trace.names import named, names_text
 
 Output = list[str]
 _SHOW = re.compile(rf"(?P<name>{NAME})\s*\?$")
-_SET = re.compile(rf"(?P<name>{NAME})\s*=(?!=)\s*(?P<value>.*)$")
+_SET = re.compile(rf"(?P<name>{NAME})\s*=(?![=>])\s*(?P<value>.*)$")
+_IN_BRACKETS = re.compile(r"<(.*)>$")
+"""As the paper prints what is typed: `<TASK-LEVEL>`."""
 HELP = """\
 NAME                    run the module, procedure, owner or table of that name on the level chosen
 NAME(VALUE, ...)        the same, with arguments
@@ -119,7 +121,7 @@ class Commands:
         Raises:
             Refused: It was not done.
         """
-        text = line.partition("#")[0].strip()
+        text = _IN_BRACKETS.sub(r"\1", line.partition("#")[0].strip()).strip()
         if not text:
             return []
         if text == "clear":  # as in every terminal; in capitals, as the paper types names, it is a module

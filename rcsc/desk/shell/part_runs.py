@@ -45,7 +45,7 @@ from rcsc.run.signature import Values
 
 STEPS = ("preprocess", "state_table", "postprocess")
 """The parts of a cycle, in order."""
-_CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
+_CALL = re.compile(r"(?P<name>(?:[\w.\-]|=>)+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,9 +220,8 @@ def _match(part: _Part, table: Table) -> str:
 def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:
     if len(given) != len(procedure.params):
         wanted = ", ".join(param.name for param in procedure.params) or "none"
-        raise Refused(
-            Code.SHELL_COMMAND, f"`{procedure.name}` takes {len(procedure.params)} arguments: {wanted}"
-        )
+        many = f"{len(procedure.params)} argument{'s' * (len(procedure.params) != 1)}"
+        raise Refused(Code.SHELL_COMMAND, f"`{procedure.name}` takes {many}: {wanted}")
     return [
         _argument(param.name, param.type, text) for param, text in zip(procedure.params, given, strict=True)
     ]

@@ -122,6 +122,12 @@ def _no_variable(name: str, rest: str, level: RunningLevel, levels: Sequence[Run
         return unknown(
             name, "variable", [f"{one.name}.{leaf.name}" for one in levels for leaf in one.sign.leaves]
         )
+    fields = [
+        f"`{leaf.name}`" for leaf in level.sign.leaves if normal(leaf.name).endswith(f".{normal(name)}")
+    ]
+    if fields:
+        message = f"level `{level.name}` has no variable `{name}`"
+        return Refused(Code.SHELL_NAME, message, f"fields of that name: {', '.join(fields[:MOST_MEMBERS])}")
     others = [f"`{one.name}.{name}`" for one in levels if positions(one.sign, name)]
     if others:
         message = f"level `{level.name}` has no variable `{name}`"

@@ -87,8 +87,8 @@ def nearest(name: str, known: Mapping[str, Column]) -> str:
 
 
 def normal(name: str) -> str:
-    """The spelling by which names are compared."""
-    return name.casefold().replace("-", "_")
+    """The spelling by which names are compared: `CMD=>FAILURE` is `cmd_failure`."""
+    return name.casefold().replace("=>", "_").replace("-", "_")
 
 
 def known_name(name: str, known: Iterable[str]) -> str | None:
