@@ -395,6 +395,7 @@ def test_the_studio_lets_it_run_pauses_it_and_lets_it_go(system: Supervisor) -> 
     live = Live(opening, lambda *_: None, lambda do, _: work.append(do), Pace(None, runs=True))
     live.open()
     assert live.state()["going"]
+    assert live.state()["faults"] == [{"name": "wheel_slips", "on": False}]
     first = live.state()["tick"]
     while live.state()["tick"] < first + 5:
         work.pop(0)()

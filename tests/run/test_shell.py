@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.commands import HELP, Commands
+from rcsc.desk.shell.commands import HELP, Commands, RunOrder
 from rcsc.desk.shell.reload.reload import Origin, kept, laid_out
 from rcsc.desk.shell.session import Session
 from rcsc.front.commands import run as in_process
@@ -418,6 +418,16 @@ def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
             do(commands, "undo")
         do(commands, "step")
     do(commands, "expect task.to_workstation.status_report = done and emove.table = pause_emove")
+
+
+@pytest.mark.parametrize(
+    "line", ["run 5", "step 3", "step gripper 2", "reload proved", "diff", "cur_state ?"]
+)
+def test_a_line_in_the_brackets_of_the_paper_is_that_line(shell: Commands, line: str) -> None:
+    """Also for who asks beforehand whether it runs cycles, or proves."""
+    for asked in (shell.run_order, shell.proves, shell.proves_together):
+        assert asked(f"<{line}>  # as printed") == asked(line)
+    assert shell.run_order("<step 3>") == RunOrder(3, steps=True)
 
 
 def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) -> None:

@@ -81,6 +81,11 @@ A CONDITION compares variables: task.cur_state = state_3 and not (new_command or
 Everything from # on is a comment."""
 
 
+def said(line: str) -> str:
+    """Return what a line says, without its comment, and without the brackets in which the paper prints it."""
+    return _IN_BRACKETS.sub(r"\1", line.partition("#")[0].strip()).strip()
+
+
 @dataclass(frozen=True, slots=True)
 class RunOrder:
     """Cycles to be run.
@@ -121,7 +126,7 @@ class Commands:
         Raises:
             Refused: It was not done.
         """
-        text = _IN_BRACKETS.sub(r"\1", line.partition("#")[0].strip()).strip()
+        text = said(line)
         if not text:
             return []
         if text == "clear":  # as in every terminal; in capitals, as the paper types names, it is a module
@@ -333,7 +338,7 @@ class Commands:
         Raises:
             Refused: It would be refused.
         """
-        word, _, rest = line.partition("#")[0].strip().partition(" ")
+        word, _, rest = said(line).partition(" ")
         rest = rest.strip()
         if word.casefold() == "run":
             return self._run_order(rest)
@@ -347,7 +352,7 @@ class Commands:
 
     def proves(self, line: str) -> bool:
         """Return whether a line proves or compiles: it takes or compares tables, or runs a part by name."""
-        text = line.partition("#")[0].strip()
+        text = said(line)
         word = text.partition(" ")[0].casefold()
         return word in {"diff", "reload"} or not (
             word in self._words or _SHOW.match(text) or _SET.match(text)
@@ -355,7 +360,7 @@ class Commands:
 
     def proves_together(self, line: str) -> bool:
         """Return whether a line first has the levels proved together, which may take minutes."""
-        word, _, rest = line.partition("#")[0].strip().partition(" ")
+        word, _, rest = said(line).partition(" ")
         return word.casefold() == "reload" and "proved" in _flags(rest)[1]
 
     def stepped(self, alone: str = "") -> Output:

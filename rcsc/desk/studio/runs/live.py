@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from rcsc.base.diagnostics.coded import CodedError, Refused
 from rcsc.base.diagnostics.codes import Code
-from rcsc.desk.shell.commands import Commands, Output, RunOrder
+from rcsc.desk.shell.commands import Commands, Output, RunOrder, said
 from rcsc.desk.shell.opening import Opening, opened
 from rcsc.desk.shell.session import Session
 from rcsc.desk.studio.hub import LATER, PROVER, Ask, Concern, Json
@@ -301,7 +301,7 @@ class Live(Concern):
         order = commands.run_order(line)
         if order is not None:
             return self._begin(order, ask.done)
-        if line.split("#")[0].strip() in {"quit", "clear"}:
+        if said(line) in {"quit", "clear"}:
             raise Refused(
                 Code.STUDIO,
                 "the page has no such command: it is one of the shell in a terminal",

@@ -21,7 +21,7 @@ from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files.read import Malformed, lines_of, standard_input, text, typed
 from rcsc.base.host.trust import state_folder
-from rcsc.desk.shell.commands import Commands
+from rcsc.desk.shell.commands import Commands, said
 from rcsc.desk.shell.opening import Opening, opened
 from rcsc.front.commands.shared.stopped import attach
 from rcsc.front.commands.shared.systems import ATTACH, COMPILES, EXECUTOR, PLANT, made, system_path
@@ -200,7 +200,7 @@ def _meanwhile(commands: Commands, line: str) -> list[str]:
     Raises:
         Refused: It was not done; cycles cannot be run, taken back or changed while they run.
     """
-    word = line.partition("#")[0].strip().partition(" ")[0].casefold()
+    word = said(line).partition(" ")[0].casefold()
     if word in _NOT_MEANWHILE:
         raise Refused(Code.SHELL_COMMAND, f"`{word}` has to wait: cycles run", "Ctrl-C ends them")
     return commands.do(line)
