@@ -474,12 +474,35 @@ def outcome(parser: lark.Lark, text: str, start: str) -> tuple[Any, ...]:
         return error.pos_in_stream, sorted(error.allowed or ())
 
 
+def asked_of_the_parser(texts: list[str]) -> set[tuple[str, str]]:
+    """What reading right texts has Lark parse, with its start rule: declarations, headings, and each piece of a cell."""
+    asked: set[tuple[str, str]] = set()
+    parsed = parsing._parsed
+
+    def noted(text: str, start: str) -> ParseNode:
+        asked.add((text, start))
+        return parsed(text, start)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(parsing, "_parsed", noted)
+        parsing._meant.cache_clear()
+        for text in texts:
+            assert isinstance(parse.__wrapped__(Source("case.rcs", text)), tree.File)
+    parsing._meant.cache_clear()
+    return asked
+
+
 def test_the_saved_parser_is_the_one_that_lark_makes() -> None:
-    """Of whole texts, pieces of them, and texts with a slip."""
+    """Of shipped files, the manual's texts and each of their cells, of turned tables and events, too; of pieces, and texts with a slip."""
     made, kept = parsing.made(), parsing._parser()
     starts, rng = made.options.start, Random(20261122)  # noqa: S311  # texts to try
     texts = [path.read_text(encoding="utf-8") for path in SHIPPED]
-    asked = [(text, "file") for text in texts]
+    manual = (REPO / "grammar" / "manual.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^```rcs\n(.*?)^```", manual, re.DOTALL | re.MULTILINE)
+    cells = asked_of_the_parser([*texts, *(text for text in shown if "# error" not in text)])
+    asked = sorted(cells)
+    assert {start for _, start in asked} == set(starts)
+    assert [text for text, start in asked if start == "cell" and text.startswith("@T")]
     for _ in range(400):
         text = rng.choice(texts)
         at = rng.randrange(len(text))
@@ -492,8 +515,9 @@ def test_the_saved_parser_is_the_one_that_lark_makes() -> None:
     for text, start in asked:
         found = outcome(kept, text, start)
         assert found == outcome(made, text, start), (start, text)
+        assert found[0] == "a tree" or (text, start) not in cells
         right += found[0] == "a tree"
-    assert 100 < right < len(asked) - 500
+    assert len(cells) + 100 < right < len(asked) - 500
 
 
 def test_the_kept_parser_is_of_the_grammar() -> None:
