@@ -922,6 +922,26 @@ class Maker:
             BOOL, "", lambda s, v: bool(happens(s, v)) is not turned
         )
 
+    def in_mode(self, first: tuple[str, Expr | None], when: Expr | None) -> Expr | None:
+        """The condition of a row, or one about `inmode`: what its first cell says, where that is of one cycle."""
+        text, mode = first
+        rng = random.Random(f"{text} {len(self.made.text)}")  # the other draws of a seed stay what they were
+        if mode is None or "@" in text or not self.back or rng.randrange(3):
+            return when
+        of = mode.of
+        word, holds = rng.choice(
+            (
+                ("@T(inmode)", lambda s, v: of(s, v) and not of(s[PAST], v)),
+                ("not @F(inmode)", lambda s, v: of(s, v) or not of(s[PAST], v)),
+                ("was inmode", lambda s, v: of(s[PAST], v)),
+                ("inmode", of),
+            )
+        )
+        if when is None:
+            return self.possible(Expr(BOOL, word, lambda s, v: bool(holds(s, v)))) or when
+        both = Expr(BOOL, f"{word} or ({when.text})", lambda s, v: bool(holds(s, v) or when.of(s, v)))
+        return self.possible(both) or when
+
     def about_now(self) -> Expr:
         """A condition of one cycle, about a variable."""
         self.back = False
@@ -1016,7 +1036,7 @@ class Maker:
         for number in range(count):
             cells = [self.cell(leaf) for leaf in columns]
             way = rng.randrange(4)  # two lines that part, more often than not
-            when = self.possible((half, negated(half), self.truth(1), None)[way])
+            when = self.in_mode(cells[0], self.possible((half, negated(half), self.truth(1), None)[way]))
             done.append(done[same[number]] if number in same else self.actions(outputs))
             texts, does = done[-1]
             rows.append(
@@ -1055,7 +1075,7 @@ class Maker:
             texts = []
             for _, test, does in across:
                 if by is None:
-                    when = self.possible((self.truth(1), None)[rng.randrange(2)])
+                    when = self.in_mode(left[0], self.possible((self.truth(1), None)[rng.randrange(2)]))
                     says, tests, do = when.text if when else rng.choice(("", "-", "false")), (when,), does
                 else:
                     says, do = self.result(given)

@@ -753,6 +753,37 @@ class Meeting:
 
 
 @dataclass(frozen=True, slots=True)
+class Printed:
+    """How a table is printed that is printed the other way round: rows and columns as they stand, and where each line is a cell.
+
+    Attributes:
+        giving: The heading of the results.
+        by: What the columns are by; "" where they are results, so that each cell is a condition.
+        named: Whether the rows have names, which stand in a first column `line`.
+        conditions: The number of columns before `||`, without the names.
+        rows: The name of each row, without DEFAULT.
+        columns: The name of each column after `||`; `headings`, all that its heading says; `said`, that without a name and marks.
+        places: Row and column of each line, by position.
+        unsaid: The same of each of the table's `unsaid`; a column of -1 is the whole row.
+    """
+
+    giving: str
+    by: str
+    named: bool
+    conditions: int
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    headings: tuple[str, ...]
+    said: tuple[str, ...]
+    places: tuple[tuple[int, int], ...]
+    unsaid: tuple[tuple[int, int], ...]
+
+    def written(self, column: int, *, condition: bool = False) -> int:
+        """Return the position of a column after `||`, or of a condition, as changes of the text count them."""
+        return column - (not self.named) + (0 if condition else self.conditions)
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """The lines that a level tries for one command: exactly one must match in every cycle.
 
@@ -762,7 +793,7 @@ class Table:
         stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
             Where one fails the cycle ends before the table is matched; the others only tell.
         meetings: Declarations about pairs of its lines, by name.
-        turned: Whether it is printed the other way round, so that a row has several lines, a column one condition or result.
+        turned: How it is printed where it is the other way round, so that a row has several lines, a column one condition or result.
         unsaid: Of such a table, as lines that do nothing, its empty cells, or rows: where a line that is missing would stand.
     """
 
@@ -778,7 +809,7 @@ class Table:
     stops: tuple[AssumptionName, ...] = ()
     meetings: tuple[Meeting, ...] = ()
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
-    turned: bool = field(default=False, compare=False, repr=False)
+    turned: Printed | None = field(default=None, compare=False, repr=False)
     unsaid: tuple[Line, ...] = field(default=(), compare=False, repr=False)
 
     @property

@@ -14,7 +14,7 @@ from rcsc.desk.editor.places import Lines
 from rcsc.desk.editor.values import Standing, State
 from rcsc.desk.studio.tables import cells
 from rcsc.lang.interpret import matching_lines
-from rcsc.lang.model import Program
+from rcsc.lang.model import Program, Snapshot
 from rcsc.lang.resolve import compile_text
 from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
@@ -189,17 +189,17 @@ def shown(text: str, code: str) -> list[str]:
     """What stands at the places of the findings of a code, those related, too."""
     report = reported(text)
     labels = [label for each in report if each.code.value == code for label in (each.primary, *each.related)]
-    assert not any(each.proposals for each in report)
     return [text[label.span.start : label.span.end] for label in labels]
 
 
 def test_findings_of_the_proof_stand_in_cells() -> None:
     gap = MATRIX.replace("| DEFAULT     || now |", "")
     assert shown(gap, "RCS401") == ["t", "idle", "run"]
-    assert shown(MATRIX.replace("halt above all", "halt"), "RCS402") == ["idle", "stop"]
-    assert shown(MATRIX.replace("run         ||     |", "in {stop,run}|| idle |"), "RCS402")[-2:] == [
+    assert shown(MATRIX.replace("halt above all", "halt"), "RCS402") == ["idle", "stop", "done"]
+    assert shown(MATRIX.replace("run         ||     |", "in {stop,run}|| idle |"), "RCS402")[-3:] == [
         "run",
         "idle",
+        "in {stop,run}",
     ]
     assert shown(RESULTS.replace("level <= 3", "level < 2 and level > 5"), "RCS314") == [
         "level < 2 and level > 5"
@@ -256,3 +256,93 @@ def test_columns_and_rows_come_and_go_in_the_grid(width: int) -> None:
             longer = cells.with_line(text, "t", at)
             [again] = tables_of(cells.without_lines(longer, "t", [at]))
             assert cells.sheet_of(again) == sheet
+
+
+INMODE = (
+    DECLARED
+    + """
+table t giving shown {
+  | now         || 1                                 | 2                               |
+  |-------------||-----------------------------------|---------------------------------|
+  | idle        || @T(inmode)                        | @F(done) and not @T(inmode)     |
+  | in {run,stop} || @T(inmode) when done              | was inmode and not done         |
+  | DEFAULT     || shown                                                               |
+}
+table u by asked giving level_ {
+  | line | now     || none | entered : when @T(inmode) and asked /= none |
+  |------|---------||------|---------------------------------------------|
+  | a    | idle    || 1    | 2                                           |
+  | b    | /= idle || 3    | 4                                           |
+  | rest | DEFAULT || 0    |
+}
+table v {
+  | line        | now  | when                     || shown |
+  |-------------|------|--------------------------||-------|
+  | new above all | run  | @T(inmode) and level > 2 || 1     |
+  | on          | run  | inmode                   || 2     |
+  | other       | /= run | @T( inmode )           || 3     |
+  | rest        | DEFAULT |                       || 4     |
+}
+output level_ : int 0 .. 9
+"""
+)
+
+
+def in_modes(at: Snapshot) -> tuple[set[str], set[str], set[str]]:
+    """The lines of the tables of `INMODE` that match, by hand."""
+    now, before, done, was_done = (at[name] for name in ("now", "was_now", "done", "was_done"))
+    entered, level, asked = now != before, int(at["level"]), at["asked"]
+    idle, run, was_idle, was_run = now == 0, now == 1, before == 0, before == 1
+    by_result = {
+        "idle_1": idle and entered,
+        "idle_2": idle and bool(was_done) and not done and not entered,
+        "run_stop_1": not idle and was_idle and bool(was_done),
+        "run_stop_2": not idle and not was_idle and not done,
+    }
+    by_command = {
+        "a_none": idle and asked == 0,
+        "a_entered": idle and not was_idle and asked != 0,
+        "b_none": not idle and asked == 0,
+        "b_entered": not idle and was_idle and asked != 0,
+    }
+    first = run and not was_run and level > 2
+    in_lines = {"new": first, "on": run and not first, "other": not run and was_run}
+    rests = ("default", by_result), ("rest", by_command), ("rest", in_lines)
+    told = [{name for name, so in lines.items() if so} or {rest} for rest, lines in rests]
+    return told[0], told[1], told[2]
+
+
+def test_inmode_is_what_the_row_says_in_its_first_column() -> None:
+    program = program_of(INMODE)
+    known, rng = declarations(program), Random(5)  # noqa: S311
+    seen = set[tuple[str, ...]]()
+    for _ in range(2000):
+        at = {name: value for table in program.tables for name, value in snapshot(known, table, rng).items()}
+        for table, wanted in zip(program.tables, in_modes(at), strict=True):
+            assert set(map(str, matching_lines(table, at))) == wanted - {"default", "rest"}, (table.name, at)
+            seen.add((str(table.name), *sorted(wanted)))
+    assert len(seen) == 14
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("| idle        || @T(inmode)   ", "| @C          || @T(inmode)   ", "RCS315"),
+        ("| on          | run ", "| on          |     ", "RCS201"),
+        ("| 1     |\n  | on", "| inmode|\n  | on", "RCS201"),
+    ],
+)
+def test_inmode_of_a_row_that_says_nothing_is_told(old: str, new: str, code: str) -> None:
+    assert INMODE.count(old) == 1
+    found = compile_text(INMODE.replace(old, new))
+    assert not isinstance(found, Program)
+    assert found[0].code.value == code, found
+
+
+def test_a_variable_called_inmode_is_that_variable() -> None:
+    text = "input inmode : bool\nenum e { x, y }\nstate m : e\noutput o : bool\n"
+    rows = "| x || inmode | not inmode |\n| y || @T(inmode) | not @T(inmode) |"
+    [table] = program_of(
+        f"{text}table t giving o {{\n| m || true | false |\n|---||---|---|\n{rows}\n}}\n"
+    ).tables
+    assert "inmode" in {str(name) for name in table.variables}

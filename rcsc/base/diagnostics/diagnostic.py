@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from rcsc.base.diagnostics.codes import Code
@@ -37,7 +37,9 @@ class MatchedLine:
 class ChangeKind(StrEnum):
     """The part of a table that a change writes."""
 
-    CELL = "cell"  # a condition of a line
+    CELL = "cell"  # a condition of a line; of a table printed the other way round any cell of a row
+    HEADING = "heading"  # of a column
+    COLUMN = "column"  # a column more, after `||`
     SAME = "same"  # after the name of a line: that it does the same as others
     LINE = "line"  # a line more
     NO_LINE = "no line"  # a line less
@@ -49,9 +51,10 @@ class Change:
     """One change of a table's text, by names, so that it is true wherever the table stands.
 
     Attributes:
-        line: The line that is changed; empty for a new one.
-        column: Position of the cell among the conditions as written.
-        texts: Of a cell its text, of a new line the text of each condition, of `same` the other lines.
+        line: The line that is changed, or the row of a table printed the other way round; empty for a new one.
+        column: Position of the cell among the conditions as written, and then those after `||`; -1 for a first cell that is no name.
+        texts: Of a cell or heading its text, of a new line the text of each condition (and of each cell after `||`), of `same` the
+            other lines, of a new column its heading and its cell in each row.
     """
 
     place: ChangeKind
@@ -71,6 +74,7 @@ class Proposal:
         told: The text of a note: two pieces around "proved" or "not proved", or one piece without that.
         whole: Whether it is to mend all that was found of this kind: every overlap of the table, not these two lines alone.
         certain: Whether it is proved: of the text that it makes (`table.mending`).
+        sure: Whether it is offered only where it is proved.
     """
 
     title: str
@@ -80,6 +84,14 @@ class Proposal:
     told: tuple[str, ...] = ()
     whole: bool = True
     certain: bool = False
+    sure: bool = False
+
+    def closing(self) -> "Proposal":
+        """Return the proposal of a line for a part of a gap, once it is known to close all of it."""
+        told = tuple(each.replace("closes this part of the gap", "closes the gap") for each in self.told)
+        title = self.title.replace("for some of the inputs", "for all of the inputs")
+        proved = self.proved.replace("closes this part of the gap", "closes the gap")
+        return replace(self, title=title, proved=proved, told=told, whole=True)
 
     @property
     def said(self) -> str:

@@ -14,7 +14,6 @@ from rcsc.desk.editor.places import Area, Lines
 from rcsc.desk.editor.values import Grid, GridCell, GridColumn, GridRow, Standing
 from rcsc.lang.model import Array, Bool, Enum, Int, Program, Record, Single, Table, Type, spell, unit_text
 from rcsc.lang.syntax.rows import REQUIREMENTS, Cell, Cells, stub_of
-from rcsc.lang.syntax.turned import name_of
 from rcsc.lang.written.tables import RowText, WrittenPart, WrittenTable, joined_cells, pieces, tables_of
 from rcsc.proof.table.boxes import TableBoxes
 from rcsc.proof.table.regions.word_bits import words_of
@@ -63,21 +62,21 @@ def _grid(
     name = lines.area(file, written.named, written.named + len(written.name))
     first = heads[0].conditions[0].text if heads and heads[0].conditions else "line"
     if written.turned and heads:
-        rows = [_turned(row, parts, at, first == "line", table) for at, row in enumerate(rows)]
+        rows = [
+            _turned(row, parts, at, name, table)
+            for at, (row, name) in enumerate(zip(rows, written.line_names, strict=True))
+        ]
     return Grid(written.name, name, columns, tuple(rows), standing, first)
 
 
-def _turned(row: GridRow, parts: Sequence[WrittenPart], at: int, named: bool, table: Table | None) -> GridRow:
+def _turned(row: GridRow, parts: Sequence[WrittenPart], at: int, name: str, table: Table | None) -> GridRow:
     """Return a row of a turned table with its name, which may be made of its conditions, and the lines whose cells stand in it."""
-    if not named:
-        tests = [cell.text for cell in row.cells[: len(joined_cells(parts[0].heading).conditions) - 1]]
-        row = replace(row, name="default" if row.default else name_of([row.stub.text, *tests]))
     rows = [each for part in parts if at < len(part.lines) for each in part.lines[at]]
     lines = () if table is None else table.every_line
     found = [
         str(line.name) for line in lines if any(each.start <= line.span.start < each.past for each in rows)
     ]
-    return replace(row, lines=tuple(found))
+    return replace(row, name=name, lines=tuple(found))
 
 
 def _columns(

@@ -95,7 +95,9 @@ class Memo:
             OutdatedError: Nobody waits for it.
         """
         kind = "outcome", str(table.name)
-        return self._known(self._of(program), kind, (proposal, table), make, MOST_PROPOSALS, keeps_all=True)
+        return self._known(
+            self._of(program), kind, (proposal, table, table.turned), make, MOST_PROPOSALS, keeps_all=True
+        )
 
     def _known(
         self, versions: _Versions, kind: tuple[str, str], asked: object, make: Callable[[], T], most: int = MOST_EACH,

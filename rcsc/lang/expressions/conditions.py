@@ -9,7 +9,7 @@ from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.expressions.operators import Typed, compared, conversion, kind_word, same_kind, side
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.previous import AT_ONCE, OF_A_VARIABLE, OF_TWO_CYCLES, looks_back
-from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.scope import INMODE, Body, Scope
 from rcsc.lang.expressions.typed import (
     among,
     between,
@@ -84,7 +84,8 @@ class Tests:
 
     def test(self, column: int, written: tree.Condition, cell: Cell) -> Test | None:
         """Return the test of a cell; None where it is always true, or after an error."""
-        meaning = (column, cell.text if self.headings[column].subject is None else written)
+        told = self.headings[column].subject is None and INMODE not in cell.text
+        meaning = (column, cell.text if told else written)
         if meaning not in self.meant:
             self.scope.cell = cell
             self.meant[meaning] = self._test(column, written, cell)
@@ -99,7 +100,10 @@ class Tests:
         value = fold(condition)
         names = tuple(sorted(self._reads(condition), key=self.scope.order))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
+        alone = self.headings[column].subject is None
         text = " ".join(cell.text.split())
+        if alone and INMODE in text:  # as it reads in any row
+            text = spell_condition(written, True)
         if value is False or box == ():
             helps = "the line could never match: mend the condition, or take the line out"
             self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", cell.span, helps)

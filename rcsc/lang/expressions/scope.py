@@ -30,6 +30,8 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
 
 MOST_LEAVES = 10_000
+INMODE = "inmode"
+"""What a row of a table says in its first column, in a condition of the row that stands by itself."""
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
 
@@ -170,6 +172,9 @@ class Scope:
         helps = (made,) if made else helps
         if self.cell is not None and BITS.fullmatch(name.text):
             helps = (*helps, ONE_GROUP.format(name.text))
+        if name.text == INMODE:
+            where = "below `when`, or in a cell of a table `giving` results"
+            helps = (f"`{INMODE}` stands {where}: it is what the row says in its first column",)
         if name.text in self.procedures:
             helps = (f"`{name.text}` is a procedure and has no value: {CALL_UNDER}",)
         self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)

@@ -1,6 +1,8 @@
 """Tables: columns, lines, tests and actions, and the order in which a line's cells run."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Label
@@ -8,7 +10,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions.conditions import Tests
 from rcsc.lang.expressions.operators import Typed
 from rcsc.lang.expressions.placing import placed, placed_statement
-from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.scope import INMODE, Body, Scope
 from rcsc.lang.expressions.typed import Path, typed
 from rcsc.lang.leaves import expressions, may_write, reads_of
 from rcsc.lang.model import (
@@ -19,6 +21,7 @@ from rcsc.lang.model import (
     Default,
     Line,
     LineName,
+    Printed,
     Procedure,
     Read,
     Statement,
@@ -34,11 +37,12 @@ from rcsc.lang.resolve.precedence import with_precedence
 from rcsc.lang.resolve.statements import Statements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS, Bounds, Cell
-from rcsc.lang.syntax.turned import unsaid
+from rcsc.lang.syntax.turned import places, unsaid, unsaid_places
 
 
 def table(scope: Scope, written: tree.TableDecl) -> Table:
     """Resolve the table, and report what is wrong with it."""
+    written = replace(written, rows=tuple(_in_its_mode(scope, written, row) for row in written.rows))
     subjects = tuple(_subject(scope, heading) for heading in written.conditions)
     columns = tuple(
         _column(heading, subject) for heading, subject in zip(written.conditions, subjects, strict=True)
@@ -79,7 +83,10 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
                 row.cells[1].span,
                 requirements(scope, row.requirements),
             )
-    missing = () if written.turned is None or default is not None else unsaid(written.turned)
+    unmatched = () if written.turned is None or default is not None else unsaid(written.turned)
+    missing = [
+        _in_its_mode(scope, written, row) for row in unmatched
+    ]  # kept: tests are known by what they are
     empty = tuple(
         Line(LineName(row.name), cells.tests(row), (), row.span, Bounds(row.cells)) for row in missing
     )
@@ -97,9 +104,72 @@ def table(scope: Scope, written: tree.TableDecl) -> Table:
         written.span.file,
         meetings=meetings,
         requirements=requirements(scope, written.requirements),
-        turned=written.turned is not None,
+        turned=None if written.turned is None else _printed(written.turned),
         unsaid=empty,
     )
+
+
+def _printed(turned: tree.Turned) -> Printed:
+    """Return how a turned table is printed."""
+    return Printed(
+        turned.giving.cell.text,
+        "" if turned.by is None else turned.by.cell.text,
+        turned.named,
+        len(turned.conditions),
+        tuple(row.name for row in turned.rows if not row.default),
+        tuple(across.name for across in turned.across),
+        tuple(across.place.text for across in turned.across),
+        tuple(f"when {across.cell.text}" if across.whole else across.cell.text for across in turned.across),
+        tuple(places(turned)),
+        tuple(unsaid_places(turned)),
+    )
+
+
+def _in_its_mode(scope: Scope, written: tree.TableDecl, row: tree.Row) -> tree.Row:
+    """Return a row with `inmode` written out, in conditions that stand by themselves: as what the row says in its first column.
+
+    A variable, constant or member of that name goes before it.
+
+    Source: Heitmeyer, Jeffords and Labaw, "Automated consistency checking of requirements specifications", ACM TOSEM 5(3), 1996:
+    `@T(Inmode)` in a row of an event table is the event that the system enters the row's modes.
+    """
+    pairs = zip(written.conditions, row.cells[1:], strict=False)
+    if not any(heading.subject is None and INMODE in cell.text for heading, cell in pairs):
+        return row
+    first, mode = written.conditions[0], row.conditions[0]
+    taken = INMODE in scope.declared or INMODE in scope.constants or INMODE in scope.members
+    if mode is None or first.subject is None or taken:
+        return row
+    told = tree.term(first, mode)
+    conditions = tuple(
+        _with_mode(written_, told) if heading.subject is None and INMODE in cell.text else written_
+        for heading, written_, cell in zip(written.conditions, row.conditions, row.cells[1:], strict=False)
+    )
+    return replace(row, conditions=conditions)
+
+
+def _with_mode(node: Any, mode: tree.Expr) -> Any:
+    """Return syntax with `mode` wherever it says `inmode`, and in its place; what does not say it is kept as the same object."""
+    if isinstance(node, tree.Reference) and node.name.text == INMODE:
+        return _standing_at(mode, node.span)
+    return _with_parts(node, lambda part: _with_mode(part, mode))
+
+
+def _standing_at(node: Any, span: Span) -> Any:
+    """Return syntax of which every part stands at one place."""
+    return span if isinstance(node, Span) else _with_parts(node, lambda part: _standing_at(part, span))
+
+
+def _with_parts(node: Any, change: Callable[[Any], Any]) -> Any:
+    """Return syntax with each of its parts changed."""
+    if isinstance(node, tuple):
+        parts = tuple(map(change, node))
+        return node if all(new is old for new, old in zip(parts, node, strict=True)) else parts
+    if not is_dataclass(node) or isinstance(node, type):
+        return node
+    every = ((each.name, getattr(node, each.name)) for each in fields(node))
+    changed = {name: new for name, old in every if (new := change(old)) is not old}
+    return replace(node, **changed) if changed else node
 
 
 def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:

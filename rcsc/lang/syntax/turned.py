@@ -83,16 +83,33 @@ def crossed(
     return conditions, (turned.giving,), (*marked, *(_shaped(row, len(conditions)) for row in last))
 
 
+def places(turned: tree.Turned) -> Iterator[tuple[int, int]]:
+    """Yield row and column of each cell that is a line: of all that say something, but for *never*."""
+    never = tree.Comparison("=", tree.BoolLiteral(False))
+    for at, row in enumerate(turned.rows):
+        for column in () if row.default else range(len(turned.across)):
+            said = row.actions[column]
+            if said and not (turned.by is None and said == never):
+                yield at, column
+
+
+def unsaid_places(turned: tree.Turned) -> Iterator[tuple[int, int]]:
+    """Yield row and column of where lines may be missing: empty cells where cells are actions, then rows, whose column is -1."""
+    rows = [(at, row) for at, row in enumerate(turned.rows) if not row.default]
+    for at, row in rows if turned.by is not None else ():
+        yield from ((at, column) for column in range(len(turned.across)) if not row.actions[column])
+    yield from ((at, -1) for at, _ in rows)
+
+
 def unsaid(turned: tree.Turned) -> Iterator[tree.Row]:
-    """Yield, as lines that do nothing, where lines may be missing: empty cells where cells are actions, then rows."""
-    rows = [row for row in turned.rows if not row.default]
-    for row in rows if turned.by is not None else ():
-        for column, across in enumerate(turned.across):
-            if not row.actions[column]:
-                yield _cross(turned, row, column, across)
+    """Yield, as lines that do nothing, where lines may be missing."""
     blank = (None,) * len(_more(turned))
-    for row in rows:
-        yield replace(row, conditions=(*row.conditions, *blank), actions=())
+    for at, column in unsaid_places(turned):
+        row = turned.rows[at]
+        if column < 0:
+            yield replace(row, conditions=(*row.conditions, *blank), actions=())
+        else:
+            yield _cross(turned, row, column, turned.across[column])
 
 
 def _more(turned: tree.Turned) -> tuple[tree.Heading, ...]:
@@ -114,13 +131,10 @@ def _shaped(row: tree.Row, conditions: int) -> tree.Row:
 
 
 def _lines(turned: tree.Turned) -> Iterator[tuple[tree.Row, tree.Across, tree.Row]]:
-    """Yield the lines of a table without their marks, each with its row and its column; none of a cell that says nothing, or never."""
-    never = tree.Comparison("=", tree.BoolLiteral(False))
-    for row in turned.rows:
-        for column, across in enumerate(() if row.default else turned.across):
-            said = row.actions[column]
-            if said and not (turned.by is None and said == never):
-                yield row, across, _cross(turned, row, column, across)
+    """Yield the lines of a table without their marks, each with its row and its column."""
+    for at, column in places(turned):
+        row, across = turned.rows[at], turned.across[column]
+        yield row, across, _cross(turned, row, column, across)
 
 
 def _cross(turned: tree.Turned, row: tree.Row, column: int, across: tree.Across) -> tree.Row:

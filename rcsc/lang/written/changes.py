@@ -36,7 +36,7 @@ def with_proposal(source: Source, proposal: Proposal) -> str | None:
     text = source.text
     for change in proposal.changes:
         table = table_of(text, proposal.table)
-        splices = None if table is None or table.turned else _splices(text, table, change)
+        splices = None if table is None else _splices(text, table, change)
         if splices is None:
             return None
         text = spliced(text, splices)
@@ -81,14 +81,23 @@ def _splices(text: str, table: WrittenTable, change: Change) -> list[Splice] | N
     if change.place is ChangeKind.LINE:
         if not all(part.lines for part in table.parts):
             return None
-        name = fresh_name(
-            {stub_of(joined_cells(rows).conditions[0]).name.text for rows in table.parts[0].lines}
-        )
-        return new_line(text, table, max(len(part.lines) for part in table.parts), name, change.texts)
+        at = max(len(part.lines) for part in table.parts)
+        if not table.has_names:
+            return new_line(text, table, at, change.texts[0], change.texts[1:])
+        return new_line(text, table, at, fresh_name(table.line_names), change.texts)
+    if change.place is ChangeKind.COLUMN:
+        return _new_column(table, change.texts)
+    if change.place is ChangeKind.HEADING:
+        found = written_cell(table, -1, change.column)
+        return None if found is None else over(text, found[1], change.texts[0], found[0])
     at, rows = _line(table, change.line)
     if not rows:
         return None
     match change.place:
+        case ChangeKind.CELL if change.column < 0:
+            every = [part.lines[at] for part in table.parts if at < len(part.lines)]
+            firsts = (over(text, joined_cells(rows).conditions[0], change.texts[0], rows) for rows in every)
+            return [splice for each in firsts for splice in each]
         case ChangeKind.CELL:
             found = written_cell(table, at, change.column)
             return None if found is None else over(text, found[1], change.texts[0], found[0])
@@ -98,19 +107,41 @@ def _splices(text: str, table: WrittenTable, change: Change) -> list[Splice] | N
             word = f"{stub.text}, {change.texts[0]}" if same and stub.text.endswith(same[-1]) else ""
             return over(text, stub, word or f"{stub.text} same {', '.join(change.texts)}", rows)
         case ChangeKind.UNREACHABLE:
-            return over(text, joined_cells(rows).conditions[1], "DEFAULT unreachable", rows)
+            return over(
+                text, joined_cells(rows).conditions[int(table.has_names)], "DEFAULT unreachable", rows
+            )
         case _:
-            every = [row for part in table.parts for row in part.lines[at]]
-            return [(*whole_line(text, row), "") for row in every]
+            gone = [row for part in table.parts for row in part.lines[at]]
+            return [(*whole_line(text, row), "") for row in gone]
 
 
 def _line(table: WrittenTable, name: str) -> tuple[int, tuple[RowText, ...]]:
     """Return the position of a line, and its rows in the first part; no rows where there is no such line."""
-    for at, rows in enumerate(table.parts[0].lines if table.parts else ()):
-        cells = joined_cells(rows)
-        if cells.conditions and stub_of(cells.conditions[0]).name.text == name:
-            return at, rows
-    return 0, ()
+    at = table.line_names.index(name) if name in table.line_names else -1
+    return (0, ()) if at < 0 else (at, table.parts[0].lines[at])
+
+
+def _new_column(table: WrittenTable, texts: Sequence[str]) -> list[Splice] | None:
+    """Write a column after the last one: its heading, then its cell in each line, but for a DEFAULT row that has one cell for all."""
+    part = table.parts[-1]
+    firsts = {rows[0].start: text for rows, text in zip((part.heading, *part.lines), texts, strict=False)}
+    splices: list[Splice] = []
+    for row in table.rows_of(part):
+        if dashes(row):
+            past = len(row.partition("#")[0].rstrip())
+            splices.append((row.start + past, row.start + past, "---|"))
+            continue
+        cells = cells_of(row)
+        if table.once(cells):
+            continue
+        if not cells.actions:
+            return None
+        last = cells.actions[-1]
+        bar = row.find("|", last.start + len(last.text) - row.start)
+        if bar < 0:
+            return None
+        splices.append((row.start + bar + 1, row.start + bar + 1, f" {firsts.get(row.start, '')} |"))
+    return splices
 
 
 def over(text: str, cell: Cell, new: str, rows: Sequence[RowText]) -> list[Splice]:

@@ -7,10 +7,11 @@ In: a text. Out: `WrittenTable`s. Which rows go together and where cells begin i
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, count, pairwise
+from itertools import chain, count, pairwise, zip_longest
 
 from rcsc.lang.leaves import free_name
-from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts
+from rcsc.lang.syntax.rows import Cell, Cells, cut, is_separator, parts, stub_of
+from rcsc.lang.syntax.turned import NAMELESS_DEFAULT, name_of
 
 _HEAD = re.compile(
     r"^[ \t]*(?P<table>table)[ \t]+(?P<name>[A-Za-z_]\w*)(?P<turned>\s+(?:by|giving)\s[^{}|]*?)?"
@@ -86,6 +87,27 @@ class WrittenTable:
         return tuple(
             WrittenPart(tuple(groups[0]), tuple(map(tuple, groups[1:]))) for groups in found if groups
         )
+
+    @property
+    def has_names(self) -> bool:
+        """Whether the first column names the lines; else their names are made of what their conditions say."""
+        return not self.turned or joined_cells(self.parts[0].heading).conditions[0].text == "line"
+
+    @property
+    def line_names(self) -> list[str]:
+        """The names of its lines, in order."""
+        if not self.parts:
+            return []
+        every = zip_longest(*(part.lines for part in self.parts), fillvalue=())
+        return [self._line_name([joined_cells(rows) for rows in of_parts if rows]) for of_parts in every]
+
+    def _line_name(self, cells: Sequence[Cells]) -> str:
+        first = cells[0].conditions[0]
+        if self.has_names:
+            return stub_of(first).name.text
+        if self.once(cells[0]):
+            return NAMELESS_DEFAULT
+        return name_of([first.text, *(cell.text for part in cells for cell in part.conditions[1:])])
 
     def rows_of(self, part: WrittenPart) -> tuple[RowText, ...]:
         """Return all rows of one of its parts, with those of dashes."""

@@ -14,6 +14,7 @@ from rcsc.desk.editor.names.index import Space
 from rcsc.desk.editor.names.tokens import KEYWORDS
 from rcsc.desk.editor.places import Lines
 from rcsc.desk.editor.values import Grid, GridColumn
+from rcsc.lang.expressions.scope import INMODE
 from rcsc.lang.model import Bool, Enum, Int, Program, Real, Record, Type, spell, unit_text
 from rcsc.lang.syntax import tree
 from rcsc.lang.written.tables import RowText, cells_of, tables_of
@@ -148,6 +149,7 @@ class _Complete:
                 yield from (Offer(word, "keyword") for word in ("DEFAULT", "DEFAULT unreachable"))
         yield from self.variables(kind)
         if kind is None:
+            yield Offer(INMODE, "keyword", "what the row says in its first column")
             yield from self.members()
 
     def kind(self, column: GridColumn) -> Type | None:
