@@ -17,7 +17,6 @@ from rcsc.base.diagnostics.diagnostic import (
     WitnessColumn,
     sort_key,
 )
-from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import (
     Box,
@@ -34,6 +33,7 @@ from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import WRONG_STEPS, Options
 from rcsc.proof.table import cells as words
 from rcsc.proof.table.certificate import must_cover
+from rcsc.proof.table.findings import printed
 from rcsc.proof.table.findings.told import grouped, likely, names_of
 from rcsc.proof.table.regions import partition
 from rcsc.proof.table.repair import NewLine, PartingCell, Partings, changes_of, left_by, new_line
@@ -129,7 +129,8 @@ def _others(
                     else "give each query more steps with `--steps`, or simplify the conditions",
                 )
                 message = f"table `{table.name}` could not be decided: {what}"
-                yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps)
+                beside = Severity.NOTE if verdict.refuted else Severity.ERROR  # an error is told already
+                yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps, severity=beside)
             case SolversDisagree(what):
                 message = f"Z3 disagrees about table `{table.name}`: {what}; this is a bug in rcsc"
                 yield Diagnostic(Code.SOLVERS_DISAGREE, message, Label(table.span))
@@ -150,9 +151,7 @@ def _others(
             notes=_under(table, unproved),
             help=helps,
             severity=Severity.WARNING,
-            proposals=()
-            if table.turned
-            else (Proposal(title, str(table.name), "no input falls to it", (change,), helps),),
+            proposals=(Proposal(title, str(table.name), "no input falls to it", (change,), helps),),
         )
 
 
@@ -204,10 +203,11 @@ def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Di
             else ()
         )
         without = Change(ChangeKind.NO_LINE, str(table.lines[line].name))
-        proposal = Proposal(f"delete {name}", str(table.name), "no input matches it", (without,))
+        without = printed.emptied(table, line) if table.turned else without
+        title = f"empty the cell of {name}" if table.turned else f"delete {name}"
+        proposal = Proposal(title, str(table.name), "no input matches it", (without,))
         message = f"{name} can never match"
-        proposals = () if table.turned else (proposal,)
-        return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=proposals)
+        return Diagnostic(Code.DEAD_LINE, message, label, notes=notes, help=helps, proposals=(proposal,))
     message = f"{name} matches only where an assumption fails"
     return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
 
@@ -225,9 +225,10 @@ def _overlap(program: Program, partings: Partings, overlap: Overlap, options: Op
     table = partings.table
     first, second = table.lines[overlap.first], table.lines[overlap.second]
     column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
-    repair = None if options.brief else partings.best(overlap)
+    repairs = () if options.brief else partings.offered(overlap)
+    repair = next(iter(repairs), None)
     effects = _effects(program, table, overlap, options)
-    proposals = () if options.brief or table.turned else _proposals(table, (first, second), repair, effects)
+    proposals = () if options.brief else _proposals(table, overlap, repairs, effects)
     return Diagnostic(
         Code.OVERLAP,
         f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
@@ -245,22 +246,27 @@ def _overlap(program: Program, partings: Partings, overlap: Overlap, options: Op
 
 
 def _proposals(
-    table: Table, lines: tuple[Line, Line], repair: PartingCell | None, effects: Effects | None
+    table: Table, overlap: Overlap, repairs: Sequence[PartingCell], effects: Effects | None
 ) -> tuple[Proposal, ...]:
-    """Propose repairs of an overlap: a cell that parts the lines, or the declaration that they do the same."""
-    first, second = lines
+    """Propose repairs of an overlap: cells that part the lines, or the declaration that they do the same."""
+    first, second = table.lines[overlap.first], table.lines[overlap.second]
     proposals = []
-    if repair is not None:
+    for repair in repairs:
         proved = f"it parts the two lines, and line `{table.lines[repair.other].name}` takes what `{table.lines[repair.line].name}` loses"
         changes = (repair.change(table),)
         title, told = repair.write(table), repair.told(table)
-        proposals.append(Proposal(title, str(table.name), proved, changes, told, whole=False))
+        sure = table.turned is not None or not repair.box
+        proposals.append(Proposal(title, str(table.name), proved, changes, told, whole=False, sure=sure))
     if effects is not None and effects.same:
+        change: Change | None = Change(ChangeKind.SAME, str(second.name), texts=(str(first.name),))
         title = f"say that line `{second.name}` does the same as `{first.name}`"
-        change = Change(ChangeKind.SAME, str(second.name), texts=(str(first.name),))
         keep = f"or keep both, and say that they do the same: `{second.name} same {first.name}`"
+        if table.turned:
+            change = printed.same_as(table, overlap.second, overlap.first)
+            keep = f"or keep both, and say {printed.where(change)}that they do the same"
         proved = "both do the same wherever both match"
-        proposals.append(Proposal(title, str(table.name), proved, (change,), (keep,), whole=False))
+        if change is not None:
+            proposals.append(Proposal(title, str(table.name), proved, (change,), (keep,), whole=False))
     return tuple(proposals)
 
 
@@ -318,11 +324,14 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
         replace(_column(program, table, witness, (), region), inputs=inputs)
         for witness, region, inputs in zip(gap.witnesses, gap.regions, _inputs(program, gap), strict=True)
     )
-    notes = (*_patterns(gap), *_by_member(program, gap))
-    share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
+    part = ("how many inputs no line matches was not counted: what the region has is a part of them",)
+    uncounted = gap.count is None and gap.regions[0] is not None
+    notes = (*_patterns(gap), *_by_member(program, gap), *(part if uncounted else ()))
+    allowed = " that the assumptions allow" if gap.sizes else ""
+    share = f"{_share(*gap.count)} of the inputs{allowed}" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
-        repair = None if options.brief else new_line(program, table, gap)
-        if options.brief and not table.turned:
+        proposal = None if options.brief else _filling(program, table, gap)
+        if options.brief:
             smt.leave_open("a line for a gap")
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
@@ -331,10 +340,10 @@ def _gap(program: Program, table: Table, gap: Gap, options: Options) -> Diagnost
             Label(table.span),
             related=tuple(_unsaid(table, gap)),
             notes=notes,
-            help=() if repair is None else (_adding(table, repair).said,),
+            help=() if proposal is None else (proposal.said,),
             witnesses=columns,
             more=_more(program, gap),
-            proposals=() if repair is None else (_adding(table, repair),),
+            proposals=() if proposal is None else (proposal,),
         )
     assert table.default is not None
     label = Label(table.default.span)
@@ -359,7 +368,7 @@ def _unsaid(table: Table, gap: Gap) -> Iterator[Label]:
     """Yield the empty cell of a turned table, or its row, into which each input shown falls."""
     known: set[int] = set()
     for number, witness in enumerate(gap.witnesses):
-        here = next((line.cell_span(-1) for line in table.unsaid if _meets(line, witness)), None)
+        here = next((line.cell_span(-1) for line in table.unsaid if printed.meets(line, witness)), None)
         if here is not None and here.start not in known:
             known.add(here.start)
             yield Label(
@@ -367,12 +376,12 @@ def _unsaid(table: Table, gap: Gap) -> Iterator[Label]:
             )
 
 
-def _meets(line: Line, witness: Witness) -> bool:
-    """Return whether a line's tests hold at an input, as far as it says what they look at."""
-    try:
-        return all(holds(test, witness) for test in line.tests if test is not None)
-    except (LookupError, *UNDEFINED):
-        return False
+def _filling(program: Program, table: Table, gap: Gap) -> Proposal | None:
+    """Propose what closes a gap, or the part of it around its first input."""
+    if table.turned:
+        return printed.filling(program, table, gap)
+    row = new_line(program, table, gap)
+    return None if row is None else _adding(table, row)
 
 
 def _adding(table: Table, row: NewLine) -> Proposal:
@@ -401,6 +410,8 @@ def _more(program: Program, gap: Gap) -> int:
 
 def _inputs(program: Program, gap: Gap) -> list[int | None]:
     """Count the inputs of each region; None where there is none."""
+    if gap.sizes:
+        return list(gap.sizes)
     kinds: dict[str, Scalar] = program.kinds
     return [
         None if region is None else words.inputs(kinds, region, witness)

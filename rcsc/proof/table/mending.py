@@ -44,6 +44,7 @@ class Outcome(Enum):
     """The outcome of trying a proposal."""
 
     HOLDS = auto()
+    CLOSES = auto()  # all of a gap, of which it was to close a part
     FAILS = auto()
     OPEN = auto()
 
@@ -85,7 +86,10 @@ def _tried(finding: Diagnostic, trials: "_Trials") -> Diagnostic:
     said: dict[str, str] = {}
     for proposal in finding.proposals:
         outcome = trials.outcome(finding, proposal)
-        new = replace(proposal, certain=outcome is Outcome.HOLDS)
+        if outcome is Outcome.OPEN and proposal.sure:
+            outcome = Outcome.FAILS
+        whole = proposal.closing() if outcome is Outcome.CLOSES else proposal
+        new = replace(whole, certain=outcome in (Outcome.HOLDS, Outcome.CLOSES))
         said[proposal.said] = "" if outcome is Outcome.FAILS else new.said
         kept += [] if outcome is Outcome.FAILS else [new]
     return replace(
@@ -113,6 +117,14 @@ def key(finding: Diagnostic) -> tuple[str, str]:
     return finding.code.value, table if counts else finding.message
 
 
+def names_of(table: Table) -> tuple[str, ...]:
+    """Return what a line is known by in two versions of a table; where its name may be made of what its row says, by its place."""
+    printed = table.turned
+    return (
+        tuple(str(line.name) for line in table.lines) if printed is None else tuple(map(str, printed.places))
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Wrong:
     """The errors of a table, by names, so that one version of it can be compared with another.
@@ -135,14 +147,14 @@ class Wrong:
     @classmethod
     def of(cls, verdict: TableVerdict) -> "Wrong":
         """Collect a verdict's errors by name."""
-        lines, pairs, dead, gaps = verdict.table.lines, set[frozenset[str]](), set[str](), list[Gap]()
+        names, pairs, dead, gaps = names_of(verdict.table), set[frozenset[str]](), set[str](), list[Gap]()
         whole = True
         for each in verdict.findings:
             match each:
                 case Overlap(first=first, second=second):
-                    pairs.add(frozenset((lines[first].name, lines[second].name)))
+                    pairs.add(frozenset((names[first], names[second])))
                 case DeadLine(line=line):
-                    dead.add(lines[line].name)
+                    dead.add(names[line])
                 case Gap():
                     gaps.append(each)
                 case _:
@@ -240,13 +252,17 @@ class _Trials:
             return Outcome.OPEN
         if after.unmet - self.verdict.unmet:  # a declaration may have become one that never applies
             return Outcome.OPEN
-        if elsewhere or not now.within(was):
+        left = table.table.turned is not None and now.gap and None in (was.left, now.left)
+        if (
+            elsewhere or not now.within(was) or left
+        ):  # other lines of the row or the column may have lost inputs
             return Outcome.FAILS
         match finding.code:
             case Code.OVERLAP if not proposal.whole:
-                gone = not now.pairs & {
-                    frozenset(line.name for line in each.lines) for each in finding.witnesses
-                }
+                before = next(each for each in self.verdict.program.tables if each.name == proposal.table)
+                known = dict(zip((str(line.name) for line in before.lines), names_of(before), strict=True))
+                told = (frozenset(known[line.name] for line in each.lines) for each in finding.witnesses)
+                gone = now.pairs.isdisjoint(told)
             case Code.OVERLAP:
                 gone = not now.pairs
             case Code.DEAD_LINE:
@@ -255,6 +271,8 @@ class _Trials:
                 gone = table.table.default is not None and table.table.default.unreachable
             case Code.GAP if not proposal.whole and finding.witnesses:
                 gone = _matches_one(after.program, table.table, finding.witnesses[0])
+                if gone and not now.gap:
+                    return Outcome.CLOSES
             case _:
                 gone = not now.gap
         return Outcome.HOLDS if gone else Outcome.FAILS

@@ -5,15 +5,17 @@ of a table in order. Linear arithmetic settles what it can; terms that are not l
 one solver that is made when first needed; *unknown* is a finding, never a proof.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import combinations, islice
+from itertools import combinations, islice, product
+from math import prod
 from random import Random
 
 from rcsc.lang.interpret import UNDEFINED, fold
+from rcsc.lang.interval_sets import holds as within
 from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     Expr,
@@ -36,7 +38,9 @@ from rcsc.proof.symbolic import trial
 from rcsc.proof.symbolic.encode import encode
 from rcsc.proof.table.certificate import must_cover, tree_certificate
 from rcsc.proof.table.confirm import TableSolver, named, shown
-from rcsc.proof.table.regions.atoms import Formula, Universe, assumptions_of, every, lines_of, some
+from rcsc.proof.table.regions import counting
+from rcsc.proof.table.regions.atoms import Formula, Universe, assumptions_of, clauses, lines_of, some
+from rcsc.proof.table.regions.enclosing import enclosed
 from rcsc.proof.table.regions.least import find, inside, least, meeting, negated, never, whole, widest
 from rcsc.proof.table.regions.region import Bounds, NoWitness, Only, Point, Question, Rests, Search
 from rcsc.proof.table.regions.splitting import Tree
@@ -60,6 +64,12 @@ _MOST_LINES_GROWN = 64
 """Lines of a table above which no region is grown around a gap."""
 _MOST_DOUBTFUL = 200
 """Pairs of lines of one region that the solver is asked for once it has found something wrong there."""
+_MOST_OPAQUE = 12
+"""Terms that are not linear, in a table whose regions are grown by their bounds, which are made anew for each box."""
+_MOST_FORMS = 32
+"""Forms of a table whose DEFAULT is told what falls to it by linear arithmetic."""
+_MOST_COVERING = 100
+"""Nodes in which it is looked for what falls to the DEFAULT of a table of fewer lines, before the solver is asked."""
 _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
 _MOST_LINES_TRIED = 200
@@ -70,6 +80,10 @@ _FEWEST_POINTS = 40
 """Inputs that are tried whatever a table's conditions cost, beside those that are aimed."""
 _STEPS_OF_A_SAMPLE = 10
 """What it costs to have the interpreter look whether a line matches, in steps of Z3."""
+_MOST_INPUTS = 20_000
+"""Inputs of a table up to which all are tried, to count those that no line matches."""
+_STEPS_OF_A_TRIAL = 2
+"""What it costs to try one line at one of them."""
 _STEPS_OF_A_QUESTION = 4_000
 """What it costs to put a question about a region into Z3's words."""
 _NODES_OF_A_LINE = 500
@@ -89,17 +103,34 @@ class _Found:
     """A finding, with how to grow the region around its input. Growing takes longest, and is done last."""
 
     finding: TableFinding
-    grow: Callable[[], Region | None] | None = None
+    grow: Callable[[], tuple[Region | None, Snapshot]] | None = None
 
     def grown(self) -> TableFinding:
-        """Return the finding with its region."""
-        match self.finding:
-            case Overlap() if self.grow is not None:
-                return replace(self.finding, region=self.grow())
-            case Gap() if self.grow is not None:
-                return replace(self.finding, regions=(self.grow(),))
-            case _:
-                return self.finding
+        """Return the finding with its region, and its input the least of that."""
+        finding = self.finding
+        if self.grow is None or not isinstance(finding, Overlap | Gap):
+            return finding
+        region, witness = self.grow()
+        if isinstance(finding, Overlap):
+            return replace(finding, witness=witness, region=region)
+        return replace(finding, witnesses=(witness,), regions=(region,))
+
+
+@dataclass(frozen=True, slots=True)
+class _Wrong:
+    """What is wrong of an input: the same in three forms.
+
+    Attributes:
+        unless: Formulas one of which holds wherever it is not so.
+        so: Whether it is so where these lines match.
+        term: The same as `unless`, for Z3.
+        error: Whether it is one; what falls to DEFAULT is not, and Z3 is not asked about it.
+    """
+
+    unless: tuple[Formula, ...]
+    so: Callable[[frozenset[int]], bool]
+    term: Callable[[TableSolver], Term]
+    error: bool = True
 
 
 def decide(program: Program, table: Table, options: Options) -> Decided:
@@ -243,7 +274,9 @@ class _Decision:
         dead = self.dead(search)  # which may be wrong; what DEFAULT takes is not, and is looked for after it
         found += self.gap(search)
         with smt.within(self.spare):
-            findings: tuple[TableFinding, ...] = (*(each.grown() for each in found), *dead)
+            grown = [each.grown() for each in found]
+        shared = (self.with_share(each, search) if isinstance(each, Gap) else each for each in grown)
+        findings: tuple[TableFinding, ...] = (*shared, *dead)
         if search.undecided:
             many = "1 region" if search.undecided == 1 else f"{search.undecided} regions"
             findings = (*findings, Undecided(f"{many} of the input space"))
@@ -424,7 +457,8 @@ class _Decision:
         """Return whether the solver refutes that, where the tree did not look, some input is matched by no line."""
         if smt.gives_up("what no line matches"):
             return False
-        if not must_cover(self.table) and (search.undecided or len(self.clauses) <= _MOST_LINES_GROWN):
+        few = len(self.clauses) <= _MOST_LINES_GROWN and not self.plain
+        if not must_cover(self.table) and (search.undecided or few):
             return not self.tried_by() and self.holds(self.asked.none()) is Answer.UNSATISFIABLE
         return all(self.missed(asked) is Answer.UNSATISFIABLE for asked in search.doubtful)
 
@@ -474,11 +508,19 @@ class _Decision:
                 *([] if known is None else [self.snapshot(known)]),
             ]
             witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
-            pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
-            return _Found(Undecided(pair) if witness is None else Overlap(first, second, witness))
-        outside = [[some(negated(self.universe, line) for line in both)]]
-        grow = partial(self.around, point, outside) if grown and not self.options.bare else None
-        return _Found(Overlap(first, second, self.snapshot(point)), grow)
+            if witness is None:
+                names = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
+                return _Found(Undecided(names))
+        else:
+            witness = self.snapshot(point)
+        wrong = _Wrong(
+            (some(negated(self.universe, line) for line in both),),
+            frozenset((first, second)).issubset,
+            lambda z3: smt.negation(smt.all_of([z3.line(first), z3.line(second)])),
+        )
+        grown = grown and not self.options.bare and (self.grows or not isinstance(point, NoWitness))
+        grow = partial(self.around, witness, wrong) if grown else None
+        return _Found(Overlap(first, second, witness), grow)
 
     def gap(self, search: Search) -> list[_Found]:
         """Return the gap at the least input that no line matches, if there is one; also where DEFAULT takes it."""
@@ -486,8 +528,9 @@ class _Decision:
         if must_cover(self.table) and not (search.gaps or search.witnesses or tried):
             return []
         many = len(self.clauses) > _MOST_LINES_GROWN
-        if many and not must_cover(self.table):
-            search = self.search(range(len(self.assumptions)), covering=True)
+        if not must_cover(self.table) and (many or self.plain):
+            search = self.covering
+        grow = None if many or self.options.bare else partial(self.around, wrong=self.unmatched)
         seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
         covered = self.covered(search)
         if search.gaps and covered and not seen and len(search.gaps) <= _MOST_GAPS:
@@ -498,15 +541,50 @@ class _Decision:
             settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
                 point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
-                lines = [] if many else [[whole(line)] for line in self.clauses]
-                grow = None if many or self.options.bare else partial(self.around, point, lines)
-                return [_Found(Gap((self.snapshot(point),), (None,)), grow)]
+                witness: Snapshot | None = self.snapshot(point)
+                return [self.gap_at(witness, grow)]
         seen += self.tried_by()
         if covered and not search.gaps and not seen:
             return []
         seen += [self.snapshot(point) for _, point in search.gaps]
         witness = self.witness(seen, lambda z3: (z3.none(),))
-        return [_Found(Undecided("what no line matches") if witness is None else Gap((witness,), (None,)))]
+        return [self.gap_at(witness, grow if self.grows else None)]
+
+    @staticmethod
+    def gap_at(
+        witness: Snapshot | None, grow: "Callable[[Snapshot], tuple[Region | None, Snapshot]] | None"
+    ) -> _Found:
+        """Return the gap at an input, to be grown; undecided where there is none."""
+        if witness is None:
+            return _Found(Undecided("what no line matches"))
+        return _Found(Gap((witness,), (None,)), None if grow is None else partial(grow, witness))
+
+    @property
+    def unmatched(self) -> _Wrong:
+        """The wrong of a gap: that no line matches."""
+        every_line = range(len(self.clauses))
+        return _Wrong(
+            tuple(map(whole, self.clauses)),
+            lambda found: not found,
+            lambda z3: smt.any_of([z3.line(at) for at in every_line]),
+            error=must_cover(self.table),
+        )
+
+    @property
+    def grows(self) -> bool:
+        """Whether regions are grown by bounds of what is not linear: of some terms, not of the bits of wide words."""
+        return len(self.universe.opaque) <= _MOST_OPAQUE
+
+    @cached_property
+    def plain(self) -> bool:
+        """Whether all is linear, and over few forms: not the bits of wide words."""
+        return not self.universe.opaque and len(self.universe.forms) <= _MOST_FORMS
+
+    @cached_property
+    def covering(self) -> Search:
+        """The search as if there were no DEFAULT."""
+        few = len(self.clauses) <= _MOST_LINES_GROWN
+        return self.search(range(len(self.assumptions)), _MOST_COVERING if few else None, covering=True)
 
     def dead(self, search: Search | None = None) -> list[TableFinding]:
         """Find the lines that no input matches, and whether only an assumption excludes them.
@@ -551,9 +629,24 @@ class _Decision:
         return meeting(self.universe, self.clauses[at], near, _NODES_OF_A_LINE)
 
     def excluded_only(self, at: int) -> bool:
-        """Return whether a line is dead only because of an assumption that is not proved."""
-        assuming = len(self.sure) < len(self.assumed)
-        return assuming and find(self.universe, [self.line(at), *self.sure]) is not NoWitness.NONE
+        """Return whether a line is dead only because of an assumption that is not proved, as far as anybody can tell."""
+        if len(self.sure) == len(self.assumed):
+            return False
+        point = find(self.universe, [self.line(at), *self.sure])
+        if point is not NoWitness.UNKNOWN:
+            return point is not NoWitness.NONE
+        with (
+            smt.together(self.options.steps // _OF_A_LINE),
+            smt.within(self.rest) if self.few else nullcontext(),
+        ):
+            return self.surely.holds(self.surely.line(at)) is not Answer.UNSATISFIABLE
+
+    @cached_property
+    def surely(self) -> TableSolver:
+        """The table's Z3 solver that knows what is proved of the assumptions alone."""
+        proved = {each.name for each in self.program.assumptions if each.standing is Standing.PROVED}
+        names = tuple(name for name in self.table.assumptions if name in proved)
+        return TableSolver(self.program, replace(self.table, assumptions=names), self.options)
 
     @property
     def sure(self) -> list[Formula]:
@@ -586,6 +679,83 @@ class _Decision:
         with smt.within(self.spare):
             return None if smt.spent() else self.asked.witness(*terms(self.asked))
 
+    # --- shares ------------------------------------------------------------------------
+
+    def with_share(self, gap: Gap, search: Search) -> Gap:
+        """Return a gap with the number of inputs that it has, and of how many that the assumptions allow, where these were counted."""
+        glance = (
+            self.options.brief and not self.options.bare
+        )  # a repair that is tried may leave no more inputs
+        if glance or smt.gives_up("how many inputs no line matches"):
+            return gap
+        many = len(self.clauses) > _MOST_LINES_GROWN
+        plain = must_cover(self.table) or many or self.plain
+        count = self.counted(search if must_cover(self.table) else self.covering) if plain else None
+        count = count or self.counted_by_trial()
+        if count is None or not self.assumed:
+            return replace(gap, count=count)
+        sizes = (None if region is None else self.allowed_in(region) for region in gap.regions)
+        return replace(gap, count=count, sizes=tuple(sizes))
+
+    def counted(self, search: Search) -> tuple[int, int] | None:
+        """Count the inputs of regions that linear arithmetic settled; None where others are open."""
+        if search.undecided or search.witnesses or search.doubtful or not search.gaps:
+            return None
+        missing = self.sum_of(search)
+        total = None if missing is None else self.allowed_in({})
+        return None if missing is None or total is None else (missing, total)
+
+    def sum_of(self, search: Search) -> int | None:
+        """Count the inputs of the regions that a search found; None where one cannot be counted."""
+        counts = [counting.inputs(self.universe, bounds, self.columns) for bounds, _ in search.gaps]
+        return None if None in counts else sum(count or 0 for count in counts)
+
+    def allowed_in(self, region: Region) -> int | None:
+        """Count the inputs of a region that the assumptions allow; None where that was not found out."""
+        pairs = zip(self.variables, self.columns, strict=True)
+        singles = self.universe.single
+        box = [self.universe.atom(singles[column], region[v.name]) for v, column in pairs if v.name in region]
+        search = Tree(
+            self.universe, (), [*self.assumptions, clauses(box)], lambda _: NoWitness.UNKNOWN, default=False
+        ).run()
+        if search.undecided:
+            return self.trial_in(region)
+        return self.sum_of(search)
+
+    def trial_in(self, region: Region) -> int | None:
+        """Count the same by trying every input of the table; None where these are too many."""
+        if self.every_input is None:
+            return None
+        kinds = self.program.kinds
+        return sum(
+            all(within(box, key_of(kinds[name], snapshot[name])) for name, box in region.items())
+            for snapshot, _ in self.every_input
+        )
+
+    def counted_by_trial(self) -> tuple[int, int] | None:
+        """Count the inputs that no line matches by trying every input; None where these are too many."""
+        every_input = self.every_input
+        return None if every_input is None else (sum(not found for _, found in every_input), len(every_input))
+
+    @cached_property
+    def every_input(self) -> tuple[tuple[Snapshot, frozenset[int]], ...] | None:
+        """Each input that the assumptions allow, with the lines that match it; None where there are too many, or a line is not defined."""
+        extents = [self._extent(column) for column in self.columns]
+        many = prod(high - low + 1 for low, high in extents)
+        if many > _MOST_INPUTS or smt.charge(many * max(1, len(self.clauses)) * _STEPS_OF_A_TRIAL):
+            return None
+        points = product(*(range(low, high + 1) for low, high in extents))
+        snapshots = (self.snapshot(dict(zip(self.columns, point, strict=True))) for point in points)
+        assumed = [trial.ready(each.condition) for each in self.program.assumed(self.table)]
+        try:
+            return tuple(
+                (snapshot, frozenset(self.matching(snapshot)))
+                for snapshot in snapshots
+                if all(so(snapshot) for so in assumed)
+            )
+        except UNDEFINED:
+            return None
+
     # --- witnesses ---------------------------------------------------------------------
 
     def snapshot(self, point: Point) -> dict[str, Value]:
@@ -593,30 +763,51 @@ class _Decision:
         pairs = zip(self.variables, self.columns, strict=True)
         return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
 
-    def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region | None:
-        """Return the widest box around the point in which, under the assumptions, no formula of `wrong` can hold; None where given up.
+    def around(self, witness: Snapshot, wrong: _Wrong) -> tuple[Region | None, Snapshot]:
+        """Return the widest box found around an input in which, under the assumptions, it is wrong throughout, and the least input of it.
 
-        Its ends are values that the assumptions allow: where they allow nothing, nothing holds.
+        Its ends are values that the assumptions allow: where they allow nothing, nothing holds. None where it was given up.
         """
-        unwanted = [every(formulas) for formulas in wrong]
+        pairs = zip(self.variables, self.columns, strict=True)
+        point = {column: key_of(v.type, witness[v.name]) for v, column in pairs}
 
         def holds(box: Mapping[int, Bounds]) -> bool:
-            return all(self.excluded(box, formula) for formula in unwanted)
+            if all(self.excluded(box, formula) for formula in wrong.unless):
+                return True
+            return wrong.error and self.grows and bool(self.universe.opaque) and self.refuted(box, wrong)
 
         try:
             box = widest(self.universe, point, self.columns, holds)
             if self.assumed:
                 box = self._possible(box, point)
         except _OverError:
-            return None
-        return {
-            v.name: (bounds,)
+            return None, witness
+        region: Region = {
+            str(v.name): (bounds,)
             for v, column in zip(self.variables, self.columns, strict=True)
             if (bounds := box[column]) != self._extent(column)
         }
+        corner = witness if self.assumed else self.snapshot({column: low for column, (low, _) in box.items()})
+        return region, corner
+
+    def refuted(self, box: Mapping[int, Bounds], wrong: _Wrong) -> bool:
+        """Return whether Z3 says, within its budget, that it is wrong all over a box; the corners are tried before it is asked."""
+        for end in (0, 1):
+            found = self.allowed(self.snapshot({column: bounds[end] for column, bounds in box.items()}))
+            if found is not None and not wrong.so(found):
+                return False
+        if smt.gives_up("the region around an input"):
+            raise _OverError
+        if smt.spent():
+            return False
+        z3 = self.asked
+        bounds = tuple((self.universe.single[column], *ends) for column, ends in box.items())
+        region = [encode(condition, z3.frame) for condition in located(self.spelled(Question(bounds, ())))]
+        return z3.holds(*region, wrong.term(z3)) is Answer.UNSATISFIABLE
 
     def excluded(self, box: Mapping[int, Bounds], formula: Formula) -> bool:
         """Return whether, under the assumptions, a formula holds nowhere in a box; the ends of its forms are tried first."""
+        box = enclosed(self.universe, box) if self.universe.opaque and self.grows else box
         told = never(self.universe, box, formula)
         if told is None or (not told and self.assumed):
             return self.empty(box, formula)

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
+from itertools import accumulate
 from math import gcd
 
 from rcsc.base.diagnostics.diagnostic import Change, ChangeKind
@@ -25,8 +26,10 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
+    Printed,
     Program,
     Read,
+    Real,
     Scalar,
     Table,
     Test,
@@ -48,6 +51,7 @@ from rcsc.proof.table.regions.atoms import (
     clauses,
     lines_of,
 )
+from rcsc.proof.table.regions.atoms import every as every_of
 from rcsc.proof.table.regions.least import find, negated, whole
 from rcsc.proof.table.regions.partition import BudgetError, Gaps
 from rcsc.proof.table.regions.region import NoWitness
@@ -55,6 +59,10 @@ from rcsc.proof.table.regions.splitting import Tree
 from rcsc.proof.table.regions.word_bits import Part, Words, words_of
 from rcsc.proof.table.verdict import Gap, Overlap, Region, Witness
 
+MOST_JOINED = 4
+"""Conditions under `when` that one cell of a new line may join."""
+MOST_OFFERED = 3
+"""Cells of rows and columns of a turned table that are tried for one overlap."""
 MOST_ASKED = 4_000
 """Pairs of a cell and a line that are looked at for a row across variables; a table with more gets none."""
 
@@ -98,11 +106,51 @@ class PartingCell:
     def write(self, table: Table) -> str:
         """Say which cell to write, and where."""
         heading = table.columns[self.column].heading
-        return f"in line `{table.lines[self.line].name}` write `{self.text}` under `{heading}`"
+        printed = table.turned
+        if printed is None:
+            return f"in line `{table.lines[self.line].name}` write `{self.text}` under `{heading}`"
+        row, column = printed.places[self.line]
+        if self._heads(printed):
+            return f"head column `{printed.columns[column]}` with `{self.said(table)}`"
+        under = heading if self.column < printed.conditions else printed.said[column]
+        return f"in row `{printed.rows[row]}` write `{self.text}` under `{under}`"
+
+    def _heads(self, printed: Printed) -> bool:
+        """Return whether it is no cell, but a column's heading."""
+        return bool(printed.by) and self.column >= printed.conditions
+
+    def said(self, table: Table) -> str:
+        """Return the text, after `when` where that says that a heading is a condition by itself."""
+        return f"when {self.text}" if table.columns[self.column].subject is None else self.text
 
     def change(self, table: Table) -> Change:
         """Return the change of the table's text."""
-        return Change(ChangeKind.CELL, str(table.lines[self.line].name), self.column, (self.text,))
+        printed = table.turned
+        if printed is None:
+            return Change(ChangeKind.CELL, str(table.lines[self.line].name), self.column, (self.text,))
+        row, column = printed.places[self.line]
+        if self._heads(printed):
+            return with_heading(printed, column, self.said(table))
+        own = self.column < printed.conditions
+        at = printed.written(self.column if own else column, condition=own)
+        return Change(ChangeKind.CELL, printed.rows[row], at, (self.text,))
+
+
+def with_heading(printed: Printed, column: int, said: str, marks: str = "") -> Change:
+    """Return the change of what the heading of a column says, which keeps the name and the marks that are given to it."""
+    heading, old = printed.headings[column], printed.said[column]
+    stub = "" if heading == old else heading.removesuffix(old).rstrip(" :") or heading
+    if not stub and marks:
+        stub = printed.columns[column]
+    alone_ = said == stub and said == printed.columns[column]
+    text = (
+        f"{stub}{marks}"
+        if alone_ or (said == old and stub == heading)
+        else f"{stub}{marks} : {said}"
+        if stub
+        else said
+    )
+    return Change(ChangeKind.HEADING, column=printed.written(column), texts=(text,))
 
 
 class Partings:
@@ -122,16 +170,23 @@ class Partings:
         return universe, lines_of(universe, self.table), assumptions_of(universe, self.program, self.table)
 
     def best(self, overlap: Overlap) -> PartingCell | None:
-        """Return the smallest change of one cell, under a variable or a sum of some, that parts the two lines and loses no input.
+        """Return the smallest change of one cell that parts the two lines and loses no input; None of a turned table."""
+        return None if self.table.turned else next(iter(self.offered(overlap)), None)
 
-        None of a turned table, as its lines share the cells of their row and column.
+    def offered(self, overlap: Overlap) -> tuple[PartingCell, ...]:
+        """Return the changes of one cell that part two lines and lose no input of theirs, the smallest first.
+
+        A turned table's lines share the cells of their row and column: there several are worth trying, elsewhere the first.
         """
-        if self.table.turned:
-            return None
+        table = self.table
         if self._boxes is None:
-            return min(self._sums(overlap), key=lambda cell: cell.lost, default=None)
-        cell = next(iter(self.cells(overlap)), None)
-        return None if cell is None or cell.falls else cell
+            found = sorted(self._sums(overlap), key=lambda cell: cell.lost)
+        else:
+            found = [cell for cell in self._narrowed(overlap) if not cell.falls]
+        if table.turned is not None:
+            found = [cell for cell in found if _is_printed(cell, table, table.turned)]
+            return (*self._without(overlap), *found[:MOST_OFFERED])
+        return tuple(found[:1] or self._without(overlap))
 
     def cells(self, overlap: Overlap) -> tuple[PartingCell, ...]:
         """Return each change of one cell that parts the two lines, the smallest first, those that leave inputs to DEFAULT last.
@@ -139,8 +194,11 @@ class Partings:
         Taking B's keys of variable v out of line A parts the two. B then matches what A loses, if on every other variable B has
         all keys that A has: that is checked exactly. Else it falls to DEFAULT, if there is one that may be reached.
         """
+        return () if self.table.turned else self._narrowed(overlap)
+
+    def _narrowed(self, overlap: Overlap) -> tuple[PartingCell, ...]:
         decided, table = self._boxes, self.table
-        if decided is None or table.turned:
+        if decided is None:
             return ()
         kinds: dict[str, Scalar] = self.program.kinds
         default = table.default is not None and not table.default.unreachable
@@ -151,6 +209,41 @@ class Partings:
         )
         cells_ = (cell for cell in every if cell is not None and (default or not cell.falls))
         return tuple(sorted(cells_, key=lambda cell: (cell.falls, cell.lost)))
+
+    def _without(self, overlap: Overlap) -> Iterator[PartingCell]:
+        """Yield a condition under `when` that leaves to the one line what both match: `x > 3 and not (x > y)`.
+
+        Where it is open whether that ever holds, one for each of the two lines.
+        """
+        table = self.table
+        at = next(
+            (at for at, each in enumerate(table.columns) if each.subject is None and each.written), None
+        )
+        if at is None or len(table.columns) * len(table.lines) > MOST_ASKED:
+            return
+        universe, lines, _ = self._across
+        for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
+            own, theirs = table.lines[line], table.lines[other]
+            if (
+                table.turned
+                and table.turned.by
+                and not table.turned.said[table.turned.places[line][1]].startswith("when ")
+            ):
+                continue  # its column has no such condition
+            pairs = zip(table.columns, own.tests, theirs.tests, strict=True)
+            terms = [
+                _spoken(column, test) for column, mine, test in pairs if test is not None and test != mine
+            ]
+            left = [whole(lines[line]), negated(universe, whole(lines[other]))]
+            point = NoWitness.NONE if not terms or None in terms else find(universe, left)
+            if point is NoWitness.NONE:
+                continue  # nothing would be left to it
+            mine = own.tests[at]
+            but = _none_of([str(term) for term in terms])
+            text = but if mine is None else f"{alone(mine.text)} and {but}"
+            yield PartingCell(line, other, at, "", text, (), 0, falls=False)
+            if not isinstance(point, NoWitness):
+                return
 
     def _sums(self, overlap: Overlap) -> Iterator[PartingCell]:
         """Yield changes of one cell, under a variable or a sum of some, that part two lines and leave every input matched."""
@@ -178,6 +271,63 @@ class Partings:
                 if before is not None and text and find(universe, unmatched) is NoWitness.NONE:
                     less = size(before) - size(left)
                     yield PartingCell(line, other, at, "", text, left, less, falls=False)
+
+
+def _is_printed(cell: PartingCell, table: Table, printed: Printed) -> bool:
+    """Return whether the condition that changes stands in the row, or in the heading of the line's column, and so is written once."""
+    _, column = printed.places[cell.line]
+    whole = printed.said[column].startswith("when ")
+    return cell.column < printed.conditions or whole == (table.columns[cell.column].subject is None)
+
+
+_JOINED = re.compile(r"\b(or|xor|implies|when|for)\b", re.ASCII)
+
+
+def alone(text: str) -> str:
+    """Return a condition as it stands beside others that `and` joins."""
+    return f"({text})" if _JOINED.search(text) else text
+
+
+def _none_of(terms: Sequence[str]) -> str:
+    """Return the condition that not all of some conditions hold: of `not (...)` alone, what stands in it."""
+    inner = (
+        re.fullmatch(r"not (?:\((?P<whole>.*)\)|(?P<word>\w+))", terms[0], re.ASCII)
+        if len(terms) == 1
+        else None
+    )
+    if inner is not None and _balanced(inner["whole"] or ""):
+        return alone(inner["whole"] or inner["word"])
+    return f"not ({' and '.join(map(alone, terms) if len(terms) > 1 else terms)})"
+
+
+def _balanced(text: str) -> bool:
+    """Return whether no bracket of a text is closed before it is opened."""
+    depths = accumulate((character == "(") - (character == ")") for character in text)
+    return all(depth >= 0 for depth in depths)
+
+
+def either(one: str, other: str) -> str:
+    """Return the condition that one of two holds."""
+    weak = re.compile(r"\b(xor|implies|when|for)\b", re.ASCII)
+    return " or ".join(f"({each})" if weak.search(each) else each for each in (one, other))
+
+
+def _spoken(column: Column, test: Test) -> str | None:
+    """Return a cell with its heading, as a condition by itself; None for an event or a time, which are of their heading."""
+    text, heading = test.text, column.heading
+    if column.subject is None:
+        return text
+    if "@" in text or _JOINED.search(text):
+        return None
+    if re.match(r"(/=|<=|>=|=|<|>|in\b|not in\b)", text):
+        return f"{heading} {text}"
+    return (
+        f"{heading} in {text}"
+        if ".." in text
+        else f"{heading} in {{{text}}}"
+        if "," in text
+        else f"{heading} = {text}"
+    )
 
 
 def _narrowed(
@@ -364,8 +514,8 @@ class _Sum:
 
     @classmethod
     def of(cls, universe: Universe, subject: Expr) -> "_Sum | None":
-        """Return a heading as a sum; None for anything else."""
-        if isinstance(subject, Read):
+        """Return a heading as a sum, or as a number that stands for itself; None for anything else."""
+        if isinstance(subject, Read) or (isinstance(subject.type, Real) and is_finite(subject)):
             return cls(subject.type, universe.single[universe.column(subject)], 1, 0)
         if not isinstance(subject.type, Int):
             return None
@@ -459,9 +609,15 @@ class _Row:
             if name is not None and name in self.witness:
                 boxes_ = [self._turned(name, test.box) for test in every if test.box is not None]
                 yield from ((at, *self._of_box(name, box)) for box in self._boxes(name, boxes_))
+            several = list[tuple[str, Formula]]()
             for test in every:
                 if name is None or name not in self.witness or test.box is None:
-                    yield from ((at, *said) for said in self._of_condition(column, test))
+                    said = list(self._of_condition(column, test))
+                    several += said
+                    yield from ((at, *each) for each in said)
+            if column.subject is None and 1 < len(several) <= MOST_JOINED:
+                text = " and ".join(alone(each) for each, _ in several)
+                yield at, text, every_of(formula for _, formula in several)
             if name is None and column.subject is not None:
                 yield from ((at, *said) for said in self._of_sum(column.subject, every))
 
@@ -473,7 +629,7 @@ class _Row:
             return
         low, high = self.universe.low[heading.form], self.universe.high[heading.form]
         said = (_box_on(heading.form, self.universe.of(test.condition)) for test in tests)
-        at = heading.sign * (int(value) - heading.constant)
+        at = heading.sign * (key_of(subject.type, value) - heading.constant)
         sides = [
             each if holds(each, at) else complement(each, low, high) for each in said if each is not None
         ]
@@ -506,23 +662,25 @@ class _Row:
         if truth is True:
             yield test.text, formula
         elif truth is False and column.subject is None:
-            yield f"not ({test.text})", negated(self.universe, formula)
+            yield _denied(test.text, test.condition), negated(self.universe, formula)
         elif truth is False and (text := _opposite(test.text, test.condition)):
             yield text, negated(self.universe, formula)
-
-    def closes(self) -> bool:
-        """Return whether, with this row, exactly one line matches every input."""
-        row = clauses(cell.formula for cell in self.cells.values())
-        tree = Tree(
-            self.universe, [*self.lines, row], self.assumed, lambda _: NoWitness.UNKNOWN,
-            default=False, budget=MOST_ASKED, first_only=True,
-        )  # fmt: skip
-        return tree.run().proved
 
     def texts(self) -> tuple[str, ...]:
         """Return the cells of the row, up to the `||`."""
         found: Mapping[int, str] = {at: cell.text for at, cell in self.cells.items()}
         return tuple(found.get(at, "") for at in range(len(_written(self.table))))
+
+
+def closes(program: Program, table: Table, universe: Universe, more: Iterable[Iterable[Formula]]) -> bool:
+    """Return whether, with lines of these conditions more, some line matches every input; exact arithmetic alone proves it."""
+    lines = [*lines_of(universe, table), *map(clauses, more)]
+    tree = Tree(
+        universe, lines, assumptions_of(universe, program, table), lambda _: NoWitness.UNKNOWN,
+        default=False, budget=MOST_ASKED,
+    )  # fmt: skip
+    search = tree.run()
+    return not (search.gaps or search.witnesses or search.undecided)
 
 
 def _box_on(form: int, formula: Formula) -> Box | None:
@@ -550,7 +708,23 @@ def _line_across(program: Program, table: Table, witness: Witness, region: Regio
     if tests * len(table.lines) > MOST_ASKED:
         return None
     row = _Row(program, table, witness, region)
-    return NewLine(row.texts(), row.closes()) if row.choose() else None
+    if not row.choose():
+        return None
+    formulas = [cell.formula for cell in row.cells.values()]
+    return NewLine(row.texts(), closes(program, table, row.universe, [formulas]))
+
+
+_COMPARED = re.compile(r"(?P<left>[^<>=/@]+?)\s*(?P<op>/=|<=|>=|=|<|>)\s*(?P<right>[^<>=/@]+)", re.ASCII)
+
+
+def _denied(text: str, condition: Expr) -> str:
+    """Spell the opposite of a condition under `when`: of a comparison that compares."""
+    said = _COMPARED.fullmatch(text)
+    if said is None or re.search(r"\b(and|or|xor|implies|not|in|for|was)\b", text, re.ASCII):
+        return f"not ({text})"
+    other = _opposite(f"{said['op']} {said['right']}", condition)
+    other = other if re.match(r"(/=|<=|>=|<|>)", other) else f"= {other}" if other else ""
+    return f"{said['left']} {other}" if other else f"not ({text})"
 
 
 def _opposite(text: str, condition: Expr) -> str:

@@ -33,14 +33,16 @@ class Gap:
     Attributes:
         witnesses: The least one, and the least outside the regions already shown.
         regions: Around each a region that no line matches.
-        count: How many inputs there are, and of how many; None where they were not counted.
+        count: How many inputs there are, and of how many that the assumptions allow; None where they were not counted.
         patterns: The same of the bits that some line looks at, where there are others.
+        sizes: How many inputs each region has, where assumptions allow not all of its values.
     """
 
     witnesses: tuple[Witness, ...]
     regions: tuple[Region | None, ...]
     count: tuple[int, int] | None = None
     patterns: tuple[int, int] | None = None
+    sizes: tuple[int | None, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,10 @@ something. PackML's published table has three groups of such overlaps for its 20
     called = stop, done = true: `RunningToStopping` with seven of them
     called = hold, done = true: four pairs
 
-Trusted: nothing. Both choose among true findings; each is in the JSON form, with a witness that the interpreter can run.
+Trusted: nothing. They choose among true findings, and propose what is then tried; each finding is in the JSON form, with a witness that the
+interpreter can run.
 Cost: a question to Z3 a finding that is shown, and only where the program declares facts that the table does not assume.
 
-Modules: `told` (which witness is shown, and what is told together), `unread` (what is declared and nobody reads, or may not
-mean what was meant).
+Modules: `told` (which witness is shown, and what is told together), `printed` (what mends a table printed the other way round, as it is
+printed), `unread` (what is declared and nobody reads, or may not mean what was meant).
 """

@@ -72,7 +72,13 @@ def _likely_gap(program: Program, table: Table, gap: Gap, facts: Sequence[Expr],
         return gap
     order = [at, *(other for other in range(len(gap.regions)) if other != at)]
     witnesses = (witness, *(gap.witnesses[other] for other in order[1:]))
-    return replace(gap, witnesses=witnesses, regions=tuple(gap.regions[other] for other in order))
+    regions, sizes = tuple(gap.regions[other] for other in order), gap.sizes
+    return replace(
+        gap,
+        witnesses=witnesses,
+        regions=regions,
+        sizes=tuple(sizes[other] for other in order) if sizes else (),
+    )
 
 
 def _inside(program: Program, region: Region | None, witness: Witness) -> bool:

@@ -30,5 +30,6 @@ this room. What it costs: splits, which are counted and bounded; a least point w
 disjunction is bisected.
 
 Modules, in the order the data flows: `atoms`, `ends` (which lines a cut parts), `linear`, `holes` (of boxes that overlap), `partition`,
-`word_bits` (words as boxes of their bits), `region`, `points` (within bounds), `splitting`, `least`.
+`word_bits` (words as boxes of their bits), `region`, `points` (within bounds), `splitting`, `least`, `enclosing` (bounds of terms that are
+not linear), `counting` (how many inputs).
 """
