@@ -1,7 +1,8 @@
 """Wrong tables, drawn, through every command that looks at one: each ends within its bound, and none with a bug.
 
 `python -m tests.wrong --count 10000 --seed 1` for a long run, in which a command has seconds of the processor; `--helps` writes each
-proposal out and has the whole `rcsc check` look at it. `tests/table/test_wrong.py` makes short ones in the suite, with a bound in steps.
+proposal out and has the whole `rcsc check` look at it; `--tiny` draws small tables, and holds findings, regions, shares and proved
+proposals against every input. `tests/table/test_wrong.py` makes short ones in the suite, with a bound in steps.
 
 Each table has several mistakes: its cells are drawn about a few cuts a column, so that lines overlap, touch, leave gaps or never
 match; over truth values, small and large enumerations, whole numbers of up to 64 bits, doubles and singles, words and their bits, sums,
@@ -19,26 +20,31 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
+from math import prod
 from pathlib import Path
 from types import FrameType
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.base.diagnostics.diagnostic import Diagnostic, Proposal, Severity
+from rcsc.base.diagnostics.diagnostic import Diagnostic, Proposal, Severity, WitnessColumn
 from rcsc.base.diagnostics.report import Report
+from rcsc.base.diagnostics.source import Source
 from rcsc.code.testing.inputs.sampling import declarations, snapshot
 from rcsc.desk.editor.lenses import witness_run
 from rcsc.desk.editor.workspace import Workspace
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.front.commands import run
-from rcsc.lang.interpret import UNDEFINED, initial, matching_lines
-from rcsc.lang.model import Program, key_bounds, key_of, unspelled
+from rcsc.lang.interpret import UNDEFINED, fold, initial, matching_lines
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Program, Table, Value, key_bounds, key_of, unspelled, value_of_key
 from rcsc.lang.resolve import compile_text
-from rcsc.lang.written.changes import with_proposal
+from rcsc.lang.written.changes import formatted, with_proposal
 from rcsc.proof.solvers.options import Options
+from rcsc.proof.table.mending import names_of
 from tests.support.programs import turned
 
 MOST_CPU_S = 2.0
@@ -603,6 +609,245 @@ def helps_campaign(count: int, seed: int, first: int = 0) -> tuple[int, int, dic
     return many, number - first, failed
 
 
+# --- what is said of small tables, against every input --------------------------------------
+
+
+def tiny(rng: Rng) -> str:
+    """Draw a table over few values: sums, products, quotients, least and greatest; in lines, or printed the other way round."""
+    unit = rng.choice(("", "", " [mm]"))
+    ends = {name: rng.choice(((0, 6), (-3, 3), (0, 1), (1, 5), (-6, -1), (0, 12), (2, 2))) for name in "abc"}
+    if rng.randrange(2):
+        ends["c"] = (0, 0)
+    declared = [f"input {name} : int {low} .. {high}{unit}" for name, (low, high) in ends.items()]
+    declared += ["enum e_m { one, two, three }", "input m : e_m", "input d : bool", "state o : int 0 .. 9"]
+    sums = ["a + b", "a - b", "2 * a - b", "a + b + c", "abs(a - b)", "min(a, b)", "max(a, b)", "a - 3 * c"]
+    sums += [] if unit else ["a * b", "a * a - b", "a mod 3 + b"]
+    sums += ["int(d) + int(m = one)"] if unit else ["a / 2 + b"]
+    cuts = [f"{rng.randint(-7, 13)}{unit}" for _ in range(4)]
+    compared = [f"{one} {op} {cut}" for one in sums[:-1] for op in ("<", ">=", "=") for cut in cuts[:2]]
+    plain = rng.sample(compared, 4)
+    small = ends["a"][1] - ends["a"][0] < 4 and ends["b"][1] - ends["b"][0] < 4
+    events = (
+        ["@T(a > b)", "@F(d)", "not @T(m = one)", "d and was d", "@T(inmode)", "not was inmode"]
+        if small
+        else ["d"]
+    )
+    conditions = [*plain, f"{plain[0]} or d", f"m = one and {plain[1]}", rng.choice(events)]
+    heads = [
+        Heading("m", of_members(("one", "two", "three"))), Heading("d", truths), Heading("a", partial(_tiny_cell, cuts)),
+        *(Heading(each, partial(_tiny_cell, cuts)) for each in rng.sample(sums[:-1], 3)),
+    ]  # fmt: skip
+    assumed = rng.choice(("", "", "", rng.choice(plain), "a >= b", "m /= two"))
+    declared += [f"assume f : {assumed}"] if assumed else []
+    rests = " assuming f" if assumed and rng.randrange(4) else ""
+    if not rng.randrange(3):
+        columns = [(each.text, each.cells) for each in heads]
+        one = turned.drawn(columns, conditions, "o", ("0", "1", "2", "o"), rng, named=rng.randrange(3) > 0)
+        rows = [f"table t {one.said}{rests} {{", *one.turned, "}"]
+    else:
+        rows = [_tiny_table(rng, heads, conditions, rests)]
+    return "\n".join([*declared, *rows, "level l { period 100 [ms] table t }", ""])
+
+
+def _tiny_cell(cuts: Sequence[str], rng: Rng) -> str:
+    one, other = rng.sample(list(cuts), 2)
+    return rng.choice((f"< {one}", f">= {one}", f"> {other}", f"<= {other}", one, f"/= {one}"))
+
+
+def _tiny_table(rng: Rng, heads: Sequence[Heading], conditions: Sequence[str], rests: str) -> str:
+    shown = rng.sample(list(heads), rng.randint(0, 3))
+    shown += (
+        [Heading("when", lambda rng: rng.choice(list(conditions)))] if not shown or rng.randrange(3) else []
+    )
+    rows = [f"  | line | {' | '.join(each.text for each in shown)} || o |"]
+    for at in range(rng.choice((1, 2, 2, 3, 4))):
+        cells = [head.cells(rng) if rng.randrange(4) else "" for head in shown]
+        rows.append(f"  | n{at} | {' | '.join(cells)} || {rng.randrange(3)} |")
+    if not rng.randrange(3):
+        rest = rng.choice(("DEFAULT", "DEFAULT", "DEFAULT unreachable"))
+        rows.append(f"  | rest | {' | '.join([rest, *('' for _ in shown[1:])])} || 1 |")
+    return "\n".join([f"table t{rests} {{", *rows, "}"])
+
+
+@dataclass(frozen=True, slots=True)
+class Every:
+    """All inputs of a table that its assumptions allow, and the lines that match each."""
+
+    program: Program
+    inputs: list[tuple[dict[str, Value], frozenset[str]]]
+    over: frozenset[str]
+
+    @classmethod
+    def of(cls, text: str, more: Collection[str] = ()) -> "Every | None":
+        """Try every input of table `t`, over further variables, too."""
+        program = compile_text(text)
+        if not isinstance(program, Program):
+            return None
+        [table] = program.tables
+        assumed = [each.condition for each in program.assumed(table)]
+        names = dict(zip((str(each.name) for each in table.lines), names_of(table), strict=True))
+        reads = set(table.variables).union(more, *map(read_by, assumed))
+        kinds = {str(v.name): v.type for v in program.variables if v.name in reads}
+        if prod(high - low + 1 for low, high in map(key_bounds, kinds.values())) > MOST_TINY:
+            return None
+        ends = [(kind, *key_bounds(kind)) for kind in kinds.values()]
+        values = [[value_of_key(kind, key) for key in range(low, high + 1)] for kind, low, high in ends]
+        found = []
+        for point in product(*values):
+            at = initial(program) | dict(zip(kinds, point, strict=True))
+            try:
+                if all(fold(each, at) for each in assumed):
+                    found.append((at, frozenset(names[str(each)] for each in matching_lines(table, at))))
+            except UNDEFINED:
+                return None
+        return cls(program, found, frozenset(kinds))
+
+    @property
+    def table(self) -> Table:
+        """The one table."""
+        return self.program.tables[0]
+
+    @property
+    def must_cover(self) -> bool:
+        """Whether some line must match: there is no DEFAULT that may be reached."""
+        return self.table.default is None or self.table.default.unreachable
+
+    def unmatched(self) -> set[str]:
+        """The inputs that no line matches."""
+        return {_point(at) for at, lines in self.inputs if not lines}
+
+    def twice(self) -> set[str]:
+        """The inputs that several lines match."""
+        return {_point(at) for at, lines in self.inputs if len(lines) > 1}
+
+
+MOST_TINY = 20_000
+
+
+def _point(at: dict[str, Value]) -> str:
+    return repr(sorted(at.items()))
+
+
+def told_of_all(file: Path, text: str) -> tuple[Counter[str], list[str]]:
+    """Check a table and hold each finding, region, share and proved proposal against every input; what was held.
+
+    Raises:
+        AssertionError: Something is not so.
+    """
+    text = _laid_out(text)
+    every = Every.of(text)
+    came = Counter[str]()
+    if every is None or not every.inputs:
+        return came, []
+    file.write_text(text, encoding="utf-8")
+    report = _report(file)
+    of_table = [each for each in report.diagnostics if each.witnesses and each.witnesses[0].table == "t"]
+    open_ = {each.code for each in report.diagnostics} & {Code.UNDECIDED}
+    codes = {each.code for each in of_table}
+    gap, twice = every.unmatched(), every.twice()
+    if not open_:
+        wanted = Code.GAP if every.program.tables[0].default is None else Code.DEFAULT_REACHED
+        wanted = wanted if every.must_cover else Code.DEFAULT_COVERS
+        assert (wanted in codes) == bool(gap), (codes, len(gap), text)
+        assert (Code.OVERLAP in codes) == bool(twice), (codes, len(twice), text)
+    for finding in of_table:
+        if finding.code in (Code.GAP, Code.DEFAULT_REACHED, Code.DEFAULT_COVERS):
+            came += _shared(finding, every, gap, text)
+        for witness in (
+            finding.witnesses if finding.code in (Code.GAP, Code.OVERLAP, Code.DEFAULT_COVERS) else ()
+        ):
+            came += _region(finding, witness, every, text)
+        came[
+            f"{finding.code} {'with' if any(each.certain for each in finding.proposals) else 'without'} help"
+        ] += 1
+    kept = []
+    for finding in report.diagnostics:
+        for proposal in finding.proposals:
+            came[f"{finding.code} {'proved' if proposal.certain else 'not proved'}"] += 1
+            if proposal.certain:
+                kept.append(_mended(report, finding, proposal, every))
+    return came, kept
+
+
+def _laid_out(text: str) -> str:
+    return formatted(Source("t.rcs", text)) or text
+
+
+def _shared(finding: Diagnostic, every: Every, gap: set[str], text: str) -> Counter[str]:
+    told = re.search(r"([\d,]+) of ([\d,]+) \(", finding.message)
+    if told is None:
+        return Counter([f"{finding.code} without share"])
+    many, whole = (int(each.replace(",", "")) for each in told.groups())
+    whole_of_all = len(every.inputs)  # over what assumptions read, too, which may narrow nothing
+    assert many * whole_of_all == len(gap) * whole, (finding.message, len(gap), whole_of_all, text)
+    left = finding.more + sum(witness.inputs or 1 for witness in finding.witnesses)
+    assert left == many, (finding, text)
+    return Counter([f"{finding.code} with share"])
+
+
+def _region(finding: Diagnostic, witness: WitnessColumn, every: Every, text: str) -> Counter[str]:
+    """Hold a region against every input in it."""
+    names = dict(zip((str(each.name) for each in every.table.lines), names_of(every.table), strict=True))
+    said = {names[line.name] for line in witness.lines}
+    told = zip(witness.variables, witness.values, strict=True)
+    given = {name: unspelled(every.program.kinds[name], value) for name, value in told}
+    there = [lines for at, lines in every.inputs if all(at[name] == value for name, value in given.items())]
+    assert there, (witness, text)
+    assert all(said <= lines if said else not lines for lines in there), (witness, text)
+    whole = all((said <= lines if said else not lines) for _, lines in every.inputs)
+    if not witness.region and not whole:
+        return Counter([f"{finding.code} without region"])
+    claimed = "true" if not witness.region else " and ".join(f"({each})" for each in witness.region)
+    claimed = re.sub(r"was_([a-z]+)", r"was \1", claimed)
+    program = compile_text(text + f"assume region_ : {claimed}\n")
+    if not isinstance(program, Program):
+        return Counter([f"{finding.code} region not read"])
+    condition = program.assumptions[-1].condition
+    inside = [lines for at, lines in every.inputs if fold(condition, at)]
+    assert inside, (witness, text)
+    assert all(said <= lines if said else not lines for lines in inside), (witness, text)
+    if set(witness.variables) == every.over:
+        assert witness.inputs in (None, len(inside)), (witness, len(inside), text)
+    return Counter([f"{finding.code} with region"])
+
+
+def _mended(report: Report, finding: Diagnostic, proposal: Proposal, every: Every) -> str:
+    """Write a proposal that is called proved, and hold it against every input: no input is worse off, and the finding is gone."""
+    source = report.sources[finding.primary.span.file]
+    new = with_proposal(source, proposal)
+    where = f"{proposal.title!r} of\n{source.text}\nwritten:\n{new}"
+    assert new is not None, where
+    assert _laid_out(new) == new, where
+    after = Every.of(new, every.over)
+    assert after is not None, where
+    assert after.unmatched() <= every.unmatched(), where
+    assert after.twice() <= every.twice(), where
+    if finding.code is Code.GAP:
+        assert not after.unmatched() if proposal.whole else after.unmatched() < every.unmatched(), where
+    if finding.code is Code.OVERLAP:
+        names = dict(zip((str(each.name) for each in every.table.lines), names_of(every.table), strict=True))
+        pairs = [{names[line.name] for line in each.lines} for each in finding.witnesses]
+        assert not any(pair <= lines for pair in pairs for _, lines in after.inputs), where
+    return new
+
+
+def tiny_campaign(count: int, seed: int, first: int = 0) -> tuple[Counter[str], dict[int, str]]:
+    """Draw so many small tables and hold all that is said of them against every input; what was held, and what is not so."""
+    came, failed = Counter[str](), dict[int, str]()
+    for number in range(first, first + count):
+        rng = random.Random(f"{seed} {number} tiny")
+        text = next(
+            (each for each in (tiny(rng) for _ in range(20)) if isinstance(compile_text(each), Program)), ""
+        )
+        with tempfile.TemporaryDirectory(prefix="rcsc-wrong-") as place:
+            try:
+                came += told_of_all(Path(place) / "wrong.rcs", text)[0]
+            except Exception as bug:  # noqa: BLE001  # whatever it is, it is told with its number
+                failed[number] = f"{type(bug).__name__}: {str(bug)[-2500:]}"
+                print(f"table {number}: {failed[number]}", file=sys.stderr, flush=True)
+    return came, failed
+
+
 def _one(place: Path, text: str, rng: Rng, number: int, seen: Seen) -> None:
     """Run the commands; what is late counts if it is so three times, each as slow as a loop beside it: others slow the processor."""
     (place / "rcsc.toml").touch()
@@ -673,11 +918,20 @@ def main() -> None:
     arguments.add_argument(
         "--helps", action="store_true", help="write out so many proposals that are called proved"
     )
+    arguments.add_argument(
+        "--tiny", action="store_true", help="small tables: all that is said of each against every input"
+    )
     arguments.add_argument("--show", action="store_true", help="print the first, and no more")
     given = arguments.parse_args()
     os.environ["NO_COLOR"] = "1"
     if given.show:
         print(drawn(random.Random(f"{given.seed} {given.first}")))
+        return
+    if given.tiny:
+        came, untrue = tiny_campaign(given.count, given.seed, given.first)
+        for kind, often in sorted(came.items()):
+            print(f"{kind:24} {often:6}")
+        print(f"{given.count} tables, seed {given.seed}: {len(untrue)} of which something is not so")
         return
     if given.helps:
         many, tables, failed = helps_campaign(given.count, given.seed, given.first)

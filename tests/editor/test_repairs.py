@@ -98,6 +98,67 @@ WRONG = {
   | a    | <= 0  || 1   |
   | b    | >= 2  || 2   |
 """,
+    "an empty cell of a matrix": """by now giving out
+  | line | w    || off | on | stuck |
+  |------|------||-----|----|-------|
+  | a    | <= 4 || 1   | 2  |       |
+  | b    | >= 5 || 1   | 2  | 3     |
+""",
+    "columns of a matrix that overlap": """by now giving out
+  | w    || off | in {on, off} | stuck |
+  |------||-----|--------------|-------|
+  | <= 4 || 1   | 2            | 3     |
+  | >= 5 || 1   | 2            | 3     |
+""",
+    "a row that a matrix has not": """by now giving out
+  | w      || off | on | stuck |
+  |--------||-----|----|-------|
+  | <= 4   || 1   | 2  | 3     |
+  | 5 .. 7 || 1   | 2  | 3     |
+""",
+    "a column that a matrix has not": """by now giving out
+  | line | w    || off |
+  |------|------||-----|
+  | a    | <= 4 || 1   |
+  | b    | >= 5 || 1   |
+
+  | line || on |
+  |------||----|
+  | a    || 2  |
+  | b    || 2  |
+""",
+    "a column of a matrix that is a condition": """by w giving out
+  | now    || <= 4 | >= 5 | open : when door |
+  |--------||------|------|------------------|
+  | off    || 1    |      | 3                |
+  | on     || 1    | 2    |                  |
+  | stuck  || 1    | 2    |                  |
+  | DEFAULT || out                         |
+""",
+    "a row of results with a gap": """giving out
+  | line | now    || 1      | 2     |
+  |------|--------||--------|-------|
+  | a    | off    || w < 3  | w > 5 |
+  | b    | /= off || w <= 6 | w > 6 |
+""",
+    "results that overlap": """giving out
+  | now    || 1      | 2          |
+  |--------||--------|------------|
+  | off    || w < 3  | w + v >= 3 |
+  | /= off || w <= 6 | w > 6      |
+""",
+    "a row of results that is missing": """giving out
+  | line | now || 1      | 2     |
+  |------|-----||--------|-------|
+  | a    | off || w <= 3 | w > 3 |
+  | b    | on  || w <= 6 | w > 6 |
+""",
+    "a result that never comes about": """giving out
+  | now    || 1                   | 2     | out    |
+  |--------||---------------------|-------|--------|
+  | off    || now = on and w <= v | w > 3 | w <= 3 |
+  | /= off || true                |       |        |
+""",
     "a name that is misspelt": """
   | line | now    || out |
   |------|--------||-----|
@@ -108,7 +169,8 @@ WRONG = {
 
 
 def text_of(rows: str) -> str:
-    return f"{HEAD}\ntable t {{{rows}}}\n"
+    said, _, rest = rows.partition("\n")
+    return f"{HEAD}\ntable t {said}{' ' if said else ''}{{\n{rest}}}\n"
 
 
 def mended(workspace: Workspace, file: str, written: str) -> list[tuple[Finding, Repair, str]]:
@@ -199,7 +261,7 @@ def test_a_repair_is_of_the_text_as_it_is_not_of_an_older_one(what: str, tmp_pat
         (tmp_path / f"{name}.rcs").write_text("use t\n")
     used, other = str(tmp_path / "t.rcs"), str(tmp_path / "other.rcs")
     offered = 0
-    for line in re.findall(r"^  \| [a-z]+ .*\n", text, re.MULTILINE)[1:]:
+    for line in re.findall(r"^  \| [^-\s|].*\n", text, re.MULTILINE)[1:]:
         known, new = Workspace(), Workspace()
         known.open(used, text)
         known.check(str(tmp_path / "one.rcs"))

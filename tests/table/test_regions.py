@@ -48,7 +48,7 @@ from rcsc.lang.model import (
 from rcsc.proof.table import relational
 from rcsc.proof.table.confirm import TableSolver
 from rcsc.proof.table.decide import prove_table
-from rcsc.proof.table.regions import splitting
+from rcsc.proof.table.regions import counting, splitting
 from rcsc.proof.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.proof.table.regions.ends import Ends
 from rcsc.proof.table.regions.least import find, least, negated, never, whole, widest
@@ -813,3 +813,31 @@ def test_a_condition_that_would_be_too_long_written_out_is_left_to_the_solver(wo
     rows = f"| line | when ||\n| l | {many} ||\n| m | not ({many}) ||"
     verdict = verdict_of(f"input a : int 0 .. 9\ninput b : int 0 .. 9\ntable t {{\n{rows}\n}}\n")
     assert [finding.code for finding in verdict.findings] == []
+
+
+def test_points_within_sums_are_counted_as_they_are_enumerated() -> None:
+    rng, planes = random.Random(3), 0  # noqa: S311
+    for _ in range(600):
+        many = rng.choice((1, 2, 2, 2, 3, 4))
+        lows = [rng.randint(-6, 6) for _ in range(many)]
+        columns = [counting.Column(low, low + rng.randint(0, 7)) for low in lows]
+        sums = []
+        for _ in range(rng.randint(1, 3)):
+            factors, low = tuple(rng.randint(-4, 4) for _ in range(many)), rng.randint(-20, 20)
+            sums += [counting.Sum(factors, low, low + rng.randint(0, 25))] if any(factors) else []
+        points = itertools.product(*(range(low, high + 1) for low, high in columns))
+        inside = [
+            point
+            for point in points
+            if all(low <= sum(map(operator.mul, k, point)) <= high for k, low, high in sums)
+        ]
+        assert counting._counted(columns, sums, counting.MOST_SLICES) == len(inside), (columns, sums)
+        planes += len(inside) > 0 and many == 2
+    assert planes > 50
+
+
+def test_points_of_64_bits_are_counted_without_going_through_them() -> None:
+    whole = counting.Column(0, 2**63 - 1)
+    below = counting.Sum((1, -1), -(2**63), -1)  # x < y
+    assert counting._counted([whole, whole], [below], 1) == 2**63 * (2**63 - 1) // 2
+    assert counting._counted([whole] * 3, [counting.Sum((1, 1, 1), 0, 9)], counting.MOST_SLICES) is None

@@ -45,6 +45,88 @@ def test_a_help_that_another_line_makes_wrong_is_not_offered() -> None:
     assert len(said(plain)) >= 2
 
 
+def test_what_is_said_of_small_tables_holds_of_every_input() -> None:
+    """Findings, regions, shares and proved helps over sums, products and the like, also printed the other way round."""
+    came, failed = wrong.tiny_campaign(14, 7)
+    assert failed == {}
+    for what in (
+        "RCS401 with share",
+        "RCS401 with region",
+        "RCS402 with region",
+        "RCS401 proved",
+        "RCS402 proved",
+    ):
+        assert came[what], came
+
+
+def across(head: str, *rows: str, more: str = "") -> str:
+    """A table with one column over two variables, and a line for each cell."""
+    lines = "".join(f"| n{at} | {row} || {at} |\n" for at, row in enumerate(rows))
+    kinds = "real 0.0 .. 8.0" if "." in rows[0] else "int 0 .. 20"
+    return f"input a : {kinds}\ninput b : {kinds}\noutput o : int 0 .. 9\n{more}table t {{\n| line | {head} || o |\n{lines}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "share", "region", "help_"),
+    [
+        (across("a + b", "< 10", "> 12"), "36 of 441", "a <= 2, b = 10", "| new | 10 .. 12 ||"),
+        (across("when", "a + b <= 12", "a - b > 3"), "222 of 441", "a <= 16, b >= 13", "| new | a + b > 12 and a - b <= 3 ||"),
+        (across("when", "abs(a - b) <= 2", "abs(a - b) > 4"), "70 of 441", "a = 0, b in 3 .. 4", "abs(a - b) > 2 and abs(a - b) <= 4"),
+        (across("a * b", "< 100", "> 200"), "107 of 441", "a in 5 .. 10, b = 20", "| new | 100 .. 200 ||"),
+        (across("max(a, b) - min(a, b)", "< 3", "> 4"), "70 of 441", "a = 0, b in 3 .. 4", "| new | 3 .. 4 ||"),
+        (across("a + b", "< 3.0", "> 5.0"), "some inputs", "b", "| new | 3.0 .. 5.0 ||"),
+    ],
+)  # fmt: skip
+def test_a_gap_across_variables_has_region_share_and_help(
+    text: str, share: str, region: str, help_: str
+) -> None:
+    [gap] = [each for each in reported(text) if each.code == "RCS401"]
+    assert f"matches {share}" in gap.message
+    assert region in ", ".join(gap.witnesses[0].region)
+    assert help_ in gap.help[0]
+    assert gap.proposals[0].whole
+    assert ("was not counted" in " ".join(gap.notes)) == ("some" in share)
+
+
+def test_an_overlap_across_variables_has_region_and_help() -> None:
+    for head, rows, region, help_ in (
+        ("a * b", ("<= 50", ">= 40"), "a = 2, b = 20", "in line `n1` write `>= 51` under `a * b`"),
+        (
+            "when",
+            ("a + b > 3", "a * b > 9"),
+            "a >= 1, b >= 10",
+            "in line `n0` write `a + b > 3 and not (a * b > 9)`",
+        ),
+        ("a - b", ("<= 2.0", ">= 1.0"), "a", "write `>= 2.0000000000000004` under `a - b`"),
+    ):
+        [found] = [each for each in reported(across(head, *rows)) if each.code == "RCS402"]
+        assert region in ", ".join(found.witnesses[0].region), found
+        assert help_ in found.help[0], found
+
+
+def test_a_share_is_of_what_the_assumptions_allow() -> None:
+    text = across("a + b", "< 10", "> 12", more="assume near : a = b\n").replace(
+        "table t", "table t assuming near"
+    )
+    [gap] = [each for each in reported(text) if each.code == "RCS401"]
+    assert "matches 2 of 21 (9.52 %) of the inputs that the assumptions allow" in gap.message
+    assert (gap.witnesses[0].inputs or 0) + gap.more == 2
+
+
+def test_a_line_that_never_matches_does_not_rest_on_an_assumption() -> None:
+    """Of `a * a` exact arithmetic knows no sign: Z3 is asked without the assumption, too."""
+    declared = "input a : real -8.0 .. 8.0\noutput o : int 0 .. 9\nassume small : a * a < 50.0\n"
+    rows = "| p | < 1.0 | || 1 |\n| q | >= 1.0 | || 2 |\n| r | | < 0.0 || 2 |\n| s | | > 60.0 || 2 |\n"
+    text = f"{declared}table t assuming small {{\n| line | a | a * a || o |\n{rows}}}\n"
+    found = {each.message: each.severity for each in reported(text) if each.code == "RCS403"}
+    assert {
+        message.split("`")[1] + message.split("`")[4]: severity.value for message, severity in found.items()
+    } == {
+        "r can never match": "error",
+        "s matches only where an assumption fails": "warning",
+    }
+
+
 def test_a_help_past_the_budget_is_said_to_be_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rcsc.proof.table.mending.MOST_TRIED", 0)
     rows = "| p | <= 2 || 1 |\n| q | >= 2 || 2 |\n"
