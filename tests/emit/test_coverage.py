@@ -6,7 +6,7 @@ import json
 import platform
 import re
 import subprocess
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from random import Random
 
@@ -28,9 +28,9 @@ from rcsc.code.testing.coverage.document import (
     vectors_csv,
     vectors_document,
 )
-from rcsc.code.testing.coverage.goals import Reached, decides
+from rcsc.code.testing.coverage.goals import Reached, decides, decides_masked
 from rcsc.code.testing.coverage.harness import vectors_c
-from rcsc.code.testing.coverage.marks import marked, ways_of
+from rcsc.code.testing.coverage.marks import Outcomes, marked, ways_of
 from rcsc.code.testing.coverage.vector_set import vector_set, write_vectors
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.code.testing.inputs.snapshot import search_in
@@ -270,10 +270,52 @@ def test_a_machine_that_rounds_otherwise_is_refused(tmp_path: Path) -> None:
     odd = [kept for kept in document.kept if kept.case.mode]
     assert [kept.case.mode for kept in odd] == list(MODES)
     assert {kept.expected.result for kept in odd} == {7}
-    if platform.machine() in ("x86_64", "aarch64"):  # others play these as passed
+    if platform.machine() in ("x86_64", "aarch64"):  # others do not play these
         status, told = played(tmp_path, document, ("return exact;", "return true;"))
         assert (status, told.count("wrong result")) == (1, len(MODES))
     assert not any(kept.case.mode for kept in set_of(SMALL).kept)
+
+
+def test_what_a_machine_cannot_be_made_to_play_is_no_pass(tmp_path: Path) -> None:
+    document = set_of(STOPS)
+    assert played(tmp_path, document) == (0, f"{len(document.kept)} vectors, 0 wrong\n")
+    other = ["-std=gnu11", "-w", "-U__SSE2_MATH__", "-U__aarch64__", "-o", "other"]
+    files = ["vectors.c", document.symbols.source]
+    subprocess.run([str(c_compiler()), *other, *files], cwd=tmp_path, check=True)
+    ran = subprocess.run(["./other"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    left = len(MODES)
+    told = f"{len(document.kept) - left} vectors, 0 wrong, {left} not played: this machine does not round as they ask\n"
+    assert ran.stdout == told
+
+
+COUPLED = """
+input a : bool
+input b : bool
+input c : bool
+input d : bool
+output o : bool
+procedure p { if (a or b) and (c or d) { o := true } else { o := false } }
+table t {
+  | line | a       || procedures |
+  | all  | DEFAULT || p          |
+}
+"""
+
+
+def test_masking_shows_what_a_unique_cause_shows_and_more() -> None:
+    [decision] = [d for d in marked(program_of(COUPLED)).decisions if len(d.conditions) == 4]
+    assert decision.form is not None
+    every = ways_of(decision.form)
+    apart: dict[tuple[Outcomes, bool], None] = {
+        ((True, None, True, None), True): None,
+        ((False, True, False, False), False): None,
+    }
+    assert set(apart) < set(every)
+    assert (decides(apart, 2), decides_masked(apart, every, 2)) == (False, True)
+    assert not decides_masked(apart, every, 3)
+    for pair in combinations(every, 2):
+        ways = dict.fromkeys(pair)
+        assert all(decides_masked(ways, every, at) for at in range(4) if decides(ways, at))
 
 
 def test_the_ways_of_a_decision_are_those_of_short_circuits() -> None:

@@ -152,10 +152,10 @@ def harness(
         body = [KNOWN, *confined]
         body += [f"{struct} b = a; const ref_trace_t r = {name}(&b);"]
         body += [AGAIN, *call, "rcsc_calls();", *_claims(program, symbols), *_trace_claims(program, symbols)]
-    return _file(program, symbols, symbols.header, body)
+    return harness_file(program, symbols, symbols.header, body)
 
 
-def _file(program: Program, symbols: Symbols, included: str, body: Sequence[str]) -> str:
+def harness_file(program: Program, symbols: Symbols, included: str, body: Sequence[str]) -> str:
     """Return a C file whose `main` begins with a state `a` of which nothing is known."""
     parts = [f'#include "{included}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
     parts += ["int main(void) {", f"{symbols.struct} a; arbitrary(&a);", *body, "return 0; }"]
@@ -207,7 +207,7 @@ def part_harness(
             body += [f"__ESBMC_assume(ref_t{target.number}_safe(&a));"]
             body += [f"const int32_t at = ref_t{target.number}_line(&a);"]
             body += [f'__ESBMC_assert(at >= 0 && at < {line}, "exactly one line");']
-            return _file(program, symbols, symbols.source, [KNOWN, *body])
+            return harness_file(program, symbols, symbols.source, [KNOWN, *body])
         if line is not None:
             defined = f"ref_t{target.number}_safe(&a)"
             body += [f"__ESBMC_assume({defined} && ref_t{target.number}_line(&a) == {line});"]
@@ -215,7 +215,7 @@ def part_harness(
         body += [f"ref_t{target.number}_body(&b, &r);"]
         body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
         body += list(_trace_claims(program, symbols))
-    return _file(program, symbols, symbols.source, [KNOWN, *body])
+    return harness_file(program, symbols, symbols.source, [KNOWN, *body])
 
 
 def case_harness(program: Program, symbols: Symbols, target: ComparedFunction, value: Value | None) -> str:

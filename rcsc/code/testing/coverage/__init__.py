@@ -25,13 +25,17 @@ rest, and what it shows impossible is listed as that. Last, what can be spared i
 
 Coverage alone lets slips pass. So vectors also turn on each bit of each mask that a line's place turns on, have each variable at
 each end of its range, each comparison of numbers that are equal or one apart, and each line change each state that it can
-change. A vector needs nothing of the C but the function that it calls: where that must write first, there is rubbish.
+change. And at each place of the procedures something else could stand: the next constant, another variable of the type, another
+comparison, nothing at all. A vector is kept for each such slip that it notices, in what the function gives or leaves behind; where
+drawn cases notice none, cases beside those that meet the place are tried, with both sides of the key at which a comparison of reals
+turns. What is left is listed: most of it changes nothing, and nothing is claimed of it. A vector needs nothing of the C but the
+function that it calls: where that must write first, there is rubbish.
 
 Trusted: nothing for a verdict. That nothing more can be reached rests on the symbolic run and Z3, as proofs do. What it
-costs: seconds a program.
+costs: seconds a program, up to a minute for a large one.
 
 Modules, in the order the data flows: `marks` counts decisions, `case` is one vector and what it must give, `goals` what
-vectors reach and what is open, `candidates` are tried, `choose` keeps them, and says which lines
-each takes; `directed` asks for the rest; `document` writes JSON and CSV, `harness` a C file that plays them on its own;
-`vector_set` is all of it for one program.
+vectors reach and what is open, `matters` what slips they notice, `candidates` are tried, `choose` keeps them, and says which lines
+each takes; `directed` asks for the rest, `nearby` looks beside them for slips; `document` writes JSON and CSV, `harness` a C file that
+plays them on its own; `vector_set` is all of it for one program.
 """

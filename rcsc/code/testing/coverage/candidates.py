@@ -89,12 +89,33 @@ def always(program: Program, symbols: Symbols, *, reals: bool) -> Iterator[Case]
                 yield Case(Entry("check"), {**start, variable.name: value}, origin=words)
     cycles = runs(program)
     unsafe = _unsafe(program)
+    yield from _all_beyond(program, symbols)
     for mode in MODES if reals else ():
         yield Case(cycles[-1], unsafe, origin=f"a machine that rounds {mode}", mode=mode)
     for variable in (v for v in inputs(program) if not isinstance(v.type, Bool)):
         for end, value in outside_of(variable, symbols.c_type(variable.name)).items():
             for entry in cycles:
                 yield Case(entry, {**unsafe, variable.name: value}, origin=f"{variable.name} {end} its range")
+
+
+def _all_beyond(program: Program, symbols: Symbols) -> Iterator[Case]:
+    """All that can be beyond its range is, at once: the first is told."""
+    outside = {
+        v.name: next(iter(outside_of(v, symbols.c_type(v.name)).values()), None) for v in program.variables
+    }
+    given = {str(v.name) for v in inputs(program)}
+    states = {str(name): value for name, value in outside.items() if value is not None and name not in given}
+    start = initial(program)
+    yield Case(Entry("check"), {**start, **states}, origin="every variable beyond its range")
+    readings: Snapshot = {
+        str(v.name): value
+        for v in inputs(program)
+        if not isinstance(v.type, Bool) and (value := outside[v.name]) is not None
+    }
+    yield from (
+        Case(entry, {**start, **readings}, origin="every input beyond its range")
+        for entry in runs(program)[-1:]
+    )
 
 
 def _at_ends(program: Program) -> Iterator[Case]:

@@ -20,6 +20,7 @@ from rcsc.code.testing.coverage.candidates import (
 from rcsc.code.testing.coverage.case import Case, Entry, Expected, expected, ran, runs
 from rcsc.code.testing.coverage.goals import Hit, Reached
 from rcsc.code.testing.coverage.marks import marked
+from rcsc.code.testing.coverage.matters import TRIES, Matters, matters_of
 from rcsc.code.testing.executors.reference_file import all_lines
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.inputs.snapshot import InputSearch
@@ -30,6 +31,8 @@ from rcsc.lang.operator_table import Operator
 
 LEAVE_AFTER = 60
 """Sessions of one function in which nothing new is hit, after which no more are drawn."""
+MORE_TRIES = 40
+"""Kept cases in which another thing at a place is tried, before cases beside them are."""
 MOST_CYCLES = 8
 """Of a drawn session."""
 TakenLine: TypeAlias = tuple[str, str]
@@ -59,18 +62,20 @@ class Choice:
 
     program: Program
     reached: Reached
+    matters: Matters
     kept: list[Kept] = field(default_factory=list)
     sessions: list[Session] = field(default_factory=list)
 
-    def offer(self, case: Case, right: Expected | None = None) -> bool:
-        """Keep a case if it hits something new."""
+    def offer(self, case: Case, right: Expected | None = None, tries: int = TRIES) -> bool:
+        """Keep a case if it hits something new; of what it may notice (`matters`) what was tried less often is tried."""
         right = right or expected(self.program, case)
         if right is None:
             return False
-        hits = self.reached.of(case, right)
+        hits = self.reached.of(case, right) | self.matters.of(case, right, tries)
         if hits <= self.reached.hits:
             return False
         self.reached.keep(hits)
+        self.matters.keep(hits)
         self.kept.append(Kept(case, right, frozenset(hits)))
         return True
 
@@ -84,6 +89,13 @@ class Choice:
             idle = 0 if any(new) else idle + 1
             if idle > LEAVE_AFTER:
                 return
+
+    def look_again(self) -> None:
+        """Try what is open in the cases that were kept, more often than as they came."""
+        for at, kept in enumerate(self.kept):
+            if noticed := self.matters.of(kept.case, kept.expected, TRIES + MORE_TRIES):
+                self.matters.keep(noticed)
+                self.kept[at] = replace(kept, hits=kept.hits | noticed)
 
     def spare(self) -> None:
         """Drop every vector whose hits the others have; the last first, which were the hardest to come by and hit most."""
@@ -123,7 +135,11 @@ def chosen(
         reals: Whether the C looks how the machine computes reals.
     """
     program = search.program
-    choice = Choice(program, Reached(program, plan, marked(program)))
+    choice = Choice(program, Reached(program, plan, marked(program)), matters_of(program))
+    cycles, steps = ([entry for entry in runs(program) if entry.kind == kind] for kind in ("cycle", "step"))
+    for entry in cycles:  # first of all, so that what shows in a whole cycle is shown there
+        progress(f"drawing sessions of {entry.kind} {entry.name}")
+        choice.draw(entry, sessions, MOST_CYCLES)
     for case in (
         *always(program, symbols, reals=reals),
         *of_tables(search, plan, tables),
@@ -133,7 +149,7 @@ def chosen(
     for case, bits in of_masks(plan, tables):
         if not choice.reached.hits.issuperset(bits):
             choice.offer(case)
-    for entry in runs(program):
+    for entry in steps:
         progress(f"drawing sessions of {entry.kind} {entry.name}")
         choice.draw(entry, sessions, MOST_CYCLES)
     for kept in [kept for kept in choice.kept if kept.case.answers]:

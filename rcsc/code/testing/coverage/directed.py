@@ -22,6 +22,7 @@ from rcsc.code.testing.coverage.marks import (
     Marked,
     Meets,
     Outcomes,
+    any_of,
     ways_of,
 )
 from rcsc.code.testing.executors.reference_file import monitored
@@ -447,14 +448,6 @@ def _goes(occurrence: Occurrence, outcomes: Outcomes) -> Node:
         path, value = occurrence[at]
         parts += [path, value if truth else values.negation(value)]
     return values.all_of(parts)
-
-
-def any_of(conditions: Sequence[Expr]) -> Expr:
-    """That one of them holds."""
-    whole: Expr = Literal(value=False, type=Bool())
-    for condition in conditions:
-        whole = Apply(Op.OR, (whole, condition), Bool())
-    return whole
 
 
 def several(conditions: Sequence[Expr]) -> Expr:

@@ -16,6 +16,7 @@ from rcsc.code.testing.coverage.candidates import Session
 from rcsc.code.testing.coverage.case import Case, Expected, function_of
 from rcsc.code.testing.coverage.choose import Kept, TakenLine, taken
 from rcsc.code.testing.coverage.directed import Unreached
+from rcsc.code.testing.coverage.matters import Unnoticed
 from rcsc.code.testing.executors.reference_file import all_lines
 from rcsc.code.testing.executors.symbols import Symbols
 from rcsc.code.testing.inputs.vectors import Vectors
@@ -36,6 +37,8 @@ class VectorSet:
         kept: Vectors of the whole C.
         unreached: What none of them reaches.
         sessions: What was drawn on the way.
+        ways: How much else could stand somewhere in the procedures (`matters`).
+        unnoticed: What of that none of them notices: it changes nothing, or was not found to.
     """
 
     program: Program
@@ -44,6 +47,8 @@ class VectorSet:
     kept: tuple[Kept, ...]
     unreached: tuple[Unreached, ...]
     sessions: tuple[Session, ...]
+    ways: int = 0
+    unnoticed: tuple[Unnoticed, ...] = ()
 
 
 def plain(program: Program, name: str, value: Value) -> object:
@@ -149,6 +154,10 @@ def vectors_document(document: VectorSet) -> dict[str, object]:
         "unreached": [
             {name: getattr(each, name) for name in ("where", "what", "wanted", "shown", "reason")}
             for each in document.unreached
+        ],
+        "unnoticed": [
+            {"where": str(each.where), "what": each.what, "instead": each.instead}
+            for each in document.unnoticed
         ],
         "tables": [_table(document, part) for part in document.tables],
     }

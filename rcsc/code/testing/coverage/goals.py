@@ -13,6 +13,7 @@ from itertools import combinations
 from operator import and_
 from typing import TypeAlias
 
+from rcsc.code.emit.c.ctext import c_type
 from rcsc.code.emit.plan import Coded, Cuts, Direct, Index, Matcher, Plan, Truth
 from rcsc.code.testing.coverage.case import Case, Expected, ends_of, outside_of, ran
 from rcsc.code.testing.coverage.marks import Decision, Marked, Outcomes
@@ -84,6 +85,7 @@ class Reached:
         if 0 <= result < len(variables):
             variable = variables[result]
             yield ("unfit", variable.name, side(variable, before[variable.name]))
+            yield from [("unfit together",)] if self._most_beyond(before, Kind.STATE, Kind.OUTPUT) else []
             return
         yield ("checked", result)
         yield from (("fits", *at) for at in self._at_ends(before))
@@ -91,6 +93,12 @@ class Reached:
             if result in range(at):
                 return
             holds(invariant.condition, before)
+
+    def _most_beyond(self, before: Snapshot, *kinds: Kind) -> bool:
+        """Whether all variables of these kinds are beyond their ranges that can be, and there are several."""
+        own = [v for v in self.program.variables if v.kind in kinds and not isinstance(v.type, Bool)]
+        can = [v for v in own if outside_of(v, c_type(v.type))]
+        return len(can) > 1 and all(side(v, before[v.name]) for v in can)
 
     def _at_ends(self, before: Snapshot, *kinds: Kind) -> Iterator[tuple[Hashable, Hashable]]:
         """Which variables are at which end of their range."""
@@ -124,7 +132,8 @@ class Reached:
         yield ("fault", entry, right.result, right.fault_at if right.result != Fault.ADMIT else "")
         if right.result == Fault.ADMIT:
             variable = self.program.variable(right.fault_at)
-            yield ("refused", variable.name, side(variable, case.before[variable.name]))
+            yield ("refused", variable.name, *beyond(variable, case.before[variable.name]))
+            yield from [("refused together",)] if self._most_beyond(case.before, Kind.INPUT) else []
             yield from self._changed(case, right, after)
             return
         yield from (("admitted", *at) for at in self._at_ends(case.before, Kind.INPUT))
@@ -134,7 +143,7 @@ class Reached:
         yield from self._answered(case, right)
         for variable in self.program.variables:
             if variable.kind is Kind.INPUT and variable.admit is Admit.CLAMP:
-                yield ("clamped", variable.name, side(variable, case.before[variable.name]))
+                yield ("clamped", variable.name, *beyond(variable, case.before[variable.name]))
         ran(self.marked.program, case)
         for decision in self.marked.decisions:
             if decision.place.kind == "test":  # the interpreter looks at fewer tests than the C
@@ -262,6 +271,23 @@ def decides(ways: Mapping[tuple[Outcomes, bool], None], number: int) -> bool:
     return any(pairs(one, other, number) for one, other in combinations(ways, 2))
 
 
+def decides_masked(
+    ways: Mapping[tuple[Outcomes, bool], None], every: Iterable[tuple[Outcomes, bool]], number: int
+) -> bool:
+    """Whether two of these ways show that the condition decides, others differing where they decide nothing.
+
+    Args:
+        ways: Ways that were seen.
+        every: All ways in which the decision can go: what a condition decides in a way is seen beside another.
+        number: Of the condition.
+
+    Source: masking MC/DC (CAST-6, "Rationale for accepting masking MC/DC in certification projects", 2001).
+    """
+    every = tuple(every)
+    deciding = {(way[0][number], way[1]) for way in ways if any(pairs(way, other, number) for other in every)}
+    return any((not value, not truth) in deciding for value, truth in deciding)
+
+
 def pairs(one: tuple[Outcomes, bool], other: tuple[Outcomes, bool], number: int) -> bool:
     """Whether two ways show together that a condition decides."""
     (first, truth), (second, other_truth) = one, other
@@ -277,6 +303,12 @@ def pairs(one: tuple[Outcomes, bool], other: tuple[Outcomes, bool], number: int)
         for at, (a, b) in enumerate(zip(first, second, strict=True))
         if at != number
     )
+
+
+def beyond(variable: Variable, value: Value) -> tuple[str, bool]:
+    """The end of its range that a value is beyond, and whether it is the first one there: any other leaves the bound open."""
+    end = side(variable, value)
+    return end, outside_of(variable, "int64_t").get(end) == value
 
 
 def side(variable: Variable, value: Value) -> str:

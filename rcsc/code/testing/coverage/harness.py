@@ -84,8 +84,8 @@ static bool rounding(uint16_t mode)
 #endif
 }}
 
-/* Plays one vector: 0 where all is as it must be, or this machine cannot be made to round as the vector wants; 1 a wrong result,
-   2 a wrong trace, else 3 and the position of a wrong leaf. */
+/* Plays one vector: 0 where all is as it must be; -1 where this machine cannot be made to round as the vector wants, so that it was
+   not played; 1 a wrong result, 2 a wrong trace, else 3 and the position of a wrong leaf. */
 int32_t vectors_play(uint32_t number)
 {{
     static {struct} s, right;
@@ -113,7 +113,7 @@ int32_t vectors_play(uint32_t number)
     last = &answer[v->answers];
     called = true;
     if (!rounding(v->mode)) {{
-        return 0;
+        return -1;
     }}
     result = call(&s, v->function);
     (void)rounding(0u);
@@ -141,16 +141,24 @@ uint32_t vectors_count(void)
 
 int main(void)
 {{
-    uint32_t number, wrong = 0u;
+    uint32_t number, wrong = 0u, not_played = 0u;
     for (number = 0u; number < vectors_count(); number++) {{
         const int32_t result = vectors_play(number);
-        if (result != 0) {{
+        if (result < 0) {{
+            not_played++;
+        }} else if (result != 0) {{
             wrong++;
             (void)printf("vector %lu: wrong %s %ld\\n", (unsigned long)number + 1u,
                 (result == 1) ? "result" : (result == 2) ? "trace" : "leaf", (long)result - 3);
+        }} else {{
+            /* as it must be */
         }}
     }}
-    (void)printf("%lu vectors, %lu wrong\\n", (unsigned long)vectors_count(), (unsigned long)wrong);
+    (void)printf("%lu vectors, %lu wrong", (unsigned long)(vectors_count() - not_played), (unsigned long)wrong);
+    if (not_played != 0u) {{
+        (void)printf(", %lu not played: this machine does not round as they ask", (unsigned long)not_played);
+    }}
+    (void)printf("\\n");
     return (wrong == 0u) ? 0 : 1;
 }}
 #endif

@@ -177,7 +177,7 @@ class Marked:
 
 
 @dataclass(slots=True)
-class _Marker:
+class Marker:
     """Puts marks into one program."""
 
     decisions: list[Decision] = field(default_factory=list)
@@ -208,7 +208,7 @@ class _Marker:
     def truth(self, expr: Expr, decision: Decision, numbers: Iterator[int]) -> Expr:
         """A part of a decision, with a mark around each condition."""
         if isinstance(expr, Among):
-            return _any_of([self.condition(equal, decision, numbers) for equal in _equals(expr)])
+            return any_of([self.condition(equal, decision, numbers) for equal in equals_of(expr)])
         if isinstance(expr, Apply) and _is_joint(expr):
             args = tuple(self.truth(arg, decision, numbers) for arg in expr.args)
             return replace(expr, args=args)
@@ -359,7 +359,7 @@ class _Marker:
 def conditions_of(expr: Expr) -> Iterator[Expr]:
     """The conditions of a decision, in the order of the C."""
     if isinstance(expr, Among):
-        yield from _equals(expr)
+        yield from equals_of(expr)
     elif isinstance(expr, Apply) and _is_joint(expr):
         for arg in expr.args:
             yield from conditions_of(arg)
@@ -376,7 +376,7 @@ def ways_of(expr: Expr) -> list[tuple[Outcomes, bool]]:
 
 def _ways(expr: Expr, count_from: Iterator[int]) -> list[tuple[dict[int, bool], bool]]:
     if isinstance(expr, Among):
-        parts = [_ways(equal, count_from) for equal in _equals(expr)] if _equals(expr) != [expr] else []
+        parts = [_ways(equal, count_from) for equal in equals_of(expr)] if equals_of(expr) != [expr] else []
         return _joined_ways(Op.OR, parts) if parts else _leaf(next(count_from))
     if isinstance(expr, Apply) and _is_joint(expr):
         parts = [_ways(arg, count_from) for arg in expr.args]
@@ -417,8 +417,8 @@ def _negations(expr: Expr, *, opposite: bool) -> Iterator[bool]:
             return
         yield from _negations(expr.args[0], opposite=expr.op is Op.IMPLIES)
         yield from _negations(expr.args[1], opposite=False)
-    elif isinstance(expr, Among) and len(_equals(expr)) != 1:
-        yield from (False for _ in _equals(expr))
+    elif isinstance(expr, Among) and len(equals_of(expr)) != 1:
+        yield from (False for _ in equals_of(expr))
     else:
         yield opposite
 
@@ -438,7 +438,7 @@ def _is_joint(expr: Apply) -> bool:
     return expr.op in (Op.AND, Op.OR, Op.IMPLIES, Op.NOT) and mask_of(expr) is None
 
 
-def _equals(expr: Among) -> list[Expr]:
+def equals_of(expr: Among) -> list[Expr]:
     """Membership as the comparisons that it is in C."""
     kind: Scalar = expr.subject.type
     if isinstance(expr.subject, Literal):
@@ -446,7 +446,8 @@ def _equals(expr: Among) -> list[Expr]:
     return [Apply(Op.EQ, (expr.subject, Literal(value, kind)), Bool()) for value in expr.values]
 
 
-def _any_of(exprs: list[Expr]) -> Expr:
+def any_of(exprs: Sequence[Expr]) -> Expr:
+    """That one of them holds."""
     if not exprs:
         return Literal(value=False, type=Bool())
     whole = exprs[0]
@@ -457,4 +458,4 @@ def _any_of(exprs: list[Expr]) -> Expr:
 
 def marked(program: Program) -> Marked:
     """The program with its marks."""
-    return _Marker().program(program)
+    return Marker().program(program)

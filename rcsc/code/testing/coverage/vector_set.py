@@ -3,6 +3,7 @@
 In: a proved program's plan and emitted files. Out: vectors that cover the C, what none reaches, and why not.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from rcsc.code.testing.coverage.document import (
     vectors_document,
 )
 from rcsc.code.testing.coverage.harness import vectors_c
+from rcsc.code.testing.coverage.nearby import nearby
 from rcsc.code.testing.executors.symbols import symbols_of
 from rcsc.code.testing.inputs.snapshot import Missing, search_in
 from rcsc.code.testing.inputs.snapshot import Solver as Finder
@@ -68,8 +70,12 @@ def vector_set(
     choice = chosen(search, plan, symbols, tables, sessions, progress, reals=reals)
     progress(f"solving for vectors of {program.name}")
     unreached = tuple(Director(choice, asking(options)).all())
+    progress(f"looking beside vectors of {program.name}")
+    choice.look_again()
+    nearby(choice).all()
     choice.spare()
-    return VectorSet(program, symbols, tables, tuple(choice.kept), unreached, tuple(choice.sessions))
+    kept, sessions_drawn, left = tuple(choice.kept), tuple(choice.sessions), tuple(choice.matters.left())
+    return VectorSet(program, symbols, tables, kept, unreached, sessions_drawn, choice.matters.ways, left)
 
 
 def defended(document: VectorSet, files: Mapping[str, str]) -> VectorSet:
@@ -158,6 +164,17 @@ def figure(document: VectorSet) -> str:
     rest = f", {len(left) - shown} without a vector or a proof" if shown < len(left) else ""
     vectors = f"program {document.program.name}: {len(document.kept)} vectors of the whole C"
     return f"{vectors}; {shown} conditions shown to be out of reach{rest}"
+
+
+def further_figures(document: VectorSet) -> Iterator[str]:
+    """What the vectors run, kind by kind, and what of all that could stand in the procedures they notice."""
+    kinds = Counter(kept.case.entry.kind for kept in document.kept)
+    matchers = kinds["line"] + kinds["lines"]
+    yield f"{kinds['cycle']} vectors run a whole cycle, {kinds['step']} a step, {matchers} a matcher alone, {kinds['check']} `check`"
+    if document.ways:
+        noticed, left = document.ways - len(document.unnoticed), len(document.unnoticed)
+        rest = f"; of {left} no difference was found" if left else ""
+        yield f"of {document.ways} slips in procedures and conditions {noticed} are noticed{rest}"
 
 
 def _unwritten(file: Path, why: str) -> Diagnostic:
