@@ -8,6 +8,9 @@ import pytest
 
 from rcsc.base.host.tools import Absent
 from rcsc.code.testing.coverage.directed import Director
+from rcsc.code.testing.coverage.harness import vectors_c
+from rcsc.code.testing.coverage.vector_set import vector_set
+from rcsc.code.testing.target_coverage import BOARD, TargetCounts, counted_on_target
 from rcsc.front.commands import run
 from rcsc.views.evidence import coverage, llvm
 from rcsc.views.evidence.kind import Subject
@@ -34,11 +37,34 @@ def test_all_is_covered_or_out_of_reach(text: str) -> None:
     assert not evidence.missing
     assert evidence.shortfalls == ()
     assert "open" not in "".join(evidence.figures)
-    assert sum(" 0 wrong" in figure for figure in evidence.figures) == 2
+    there = not BOARD.absent()
+    assert sum(" 0 wrong" in figure for figure in evidence.figures) == 2 + there
+    assert ("target.txt" in evidence.files) is there
+    assert sum("run a whole cycle" in figure for figure in evidence.figures) == 2
     for folder in ("", "defensive/"):
         missed = json.loads(evidence.files[f"{folder}missed.json"])
         assert all(each["reason"] for each in missed)
         assert "Branch (" in evidence.files[f"{folder}coverage.txt"]
+
+
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+def test_the_targets_own_compiler_counts_what_vectors_reach_there() -> None:
+    subject = subject_of(EVERYTHING)
+    document = vector_set(subject.plan, subject.files, subject.options, None, subject.progress, 20)
+    vectors = vectors_c(document.program, document.symbols, document.kept)
+    counts = counted_on_target(subject.files, document.symbols.source, vectors)
+    assert isinstance(counts, TargetCounts), counts
+    odd = sum(bool(kept.case.mode) for kept in document.kept)
+    assert (counts.played, counts.wrong, counts.left) == (len(document.kept) - odd, 0, odd)
+    assert odd > 0
+    assert f"{odd} not played" in counts.words
+    assert 0.8 < counts.lines[1] / counts.lines[0] <= 1.0
+    assert counts.branches[1] > 50
+    few = vectors_c(document.program, document.symbols, document.kept[:3])
+    less = counted_on_target(subject.files, document.symbols.source, few)
+    assert isinstance(less, TargetCounts), less
+    assert less.lines[0] == counts.lines[0]
+    assert less.lines[1] < counts.lines[1]
 
 
 def test_a_branch_that_no_vector_takes_is_a_shortfall() -> None:
@@ -105,8 +131,10 @@ def test_the_command_shows_it_of_a_shipped_table(
     assert run(["evidence", "--only", "coverage", "--out", str(tmp_path), path]) == 0
     told = capsys.readouterr().out
     assert "15 of 16 MC/DC conditions, 1 shown to be out of reach" in told
+    assert "MC/DC is that of unique cause; by masking it is 15 of 16" in told
     folder = tmp_path / "approach" / "coverage"
-    assert {path.name for path in folder.iterdir()} == {
+    there = set() if BOARD.absent() else {"target.txt"}
+    assert {path.name for path in folder.iterdir()} == there | {
         "report.md", "coverage.txt", "vectors.c", "vectors.json", "missed.json", "defensive",
     }  # fmt: skip
     assert "**not shown**" not in (folder / "report.md").read_text("utf-8")

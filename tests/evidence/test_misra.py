@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.views.evidence.kind import Missed
 from rcsc.views.evidence.misra.compliance import (
     KIND,
     Compliance,
@@ -51,6 +52,8 @@ def test_every_guideline_has_a_row_and_each_deviation_its_place() -> None:
     assert kept["17.3"] == kept["5.1"] == kept["14.4"] == kept["Dir 4.10"] == "compliant"
     assert kept["Dir 4.1"] == kept["Dir 1.1"] == "not checked"
     assert kept["22.1"] == "not applicable"
+    assert kept["2.1"] == "not checked"
+    assert kept["12.5"] == "compliant"
     assert all(row["reasons"] for row in rows if row["compliance"] == "deviation")
     assert all(row["checked by"] for row in rows)
     assert not any(row["compliance"] == "deviation" for row in rows if row["category"] == "mandatory")
@@ -58,6 +61,40 @@ def test_every_guideline_has_a_row_and_each_deviation_its_place() -> None:
     assert sum(int(row["places"] or 0) for row in rows) == len(places)
     assert "misra-c2012-17.3:probe.c:" in evidence.files["suppressions.txt"]
     assert "\nmisra-c2012-17.3\n" not in evidence.files["suppressions.txt"]
+
+
+def test_what_coverage_shows_out_of_reach_is_a_deviation_and_what_it_does_not_explain_a_violation(
+    files: dict[str, str],
+) -> None:
+    """Neither 2.1 nor 14.3 is called compliant while the coverage of the same C says what nothing reaches."""
+    missed = [
+        Missed("probe_run_t", 3, "statement", "proved"),
+        Missed("probe_run_t", 3, "`case (-1)` true", "proved"),
+        Missed("probe_do_keep", 4, "`s->go` true", "shown"),
+        Missed("probe_do_keep", 4, "condition 1 of 2 decides on its own", "shown"),
+    ]
+    by_number = {one.number: one for one in guidelines()}
+    alone, whole, all_of_it = summary(files), summary(files, missed), summary(files, ())
+    told = [each.of(by_number["2.1"])[0] for each in (alone, whole, all_of_it)]
+    assert told == [Compliance.NOT_CHECKED, Compliance.DEVIATION, Compliance.COMPLIANT]
+    assert "which was not made" in alone.of(by_number["14.3"])[1]
+    assert alone.of(by_number["14.3"])[0] is not Compliance.COMPLIANT
+    own = [
+        (place.guideline, place.finding.file, place.finding.line)
+        for place in whole.places[len(alone.places) :]
+    ]
+    assert own == [("2.1", "probe.c", 3), ("2.1", "probe.c", 3), ("14.3", "probe.c", 4)]
+    assert whole.unexplained == ()
+    [open_] = summary(files, [Missed("probe_run_t", 3, "statement", "")]).unexplained
+    assert open_.guideline == "2.1"
+
+
+def test_extensions_and_sizes_are_searched_for_in_the_text() -> None:
+    text = (
+        "#pragma GCC optimize(1)\n#pragma STDC FP_CONTRACT OFF\nx = y + 0.0;\nsizeof(a_t) + sizeof(array);\n"
+    )
+    found = [(one.line, one.rule) for one in own_findings({"c/a.c": text})]
+    assert found == [(1, "1.2"), (3, "2.2"), (4, "12.5")]
 
 
 def test_a_table_of_more_than_32_lines_complies() -> None:

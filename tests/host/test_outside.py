@@ -851,7 +851,7 @@ SCRATCH = (
     "rcsc/views/diff/revision.py", "rcsc/code/testing/executors/native.py", "rcsc/code/testing/esbmc.py",
     "rcsc/code/testing/matcher.py", "rcsc/base/host/tools.py", "rcsc/code/testing/code_mutants.py", "rcsc/run/orders/together.py",
     "rcsc/run/link/beside.py", "rcsc/views/evidence/analysers.py", "rcsc/views/evidence/llvm.py", "rcsc/views/evidence/runtime.py",
-    "rcsc/code/testing/boards.py",
+    "rcsc/code/testing/boards.py", "rcsc/code/testing/target_coverage.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""
 STREAMS = (

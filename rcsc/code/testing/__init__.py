@@ -27,7 +27,7 @@ minutes with `--deep`.
 
 Modules, in the order the data flows: `executors`, `inputs`, `coverage` (rooms: the last one makes vectors that
 cover the whole C); `matcher` compares every mask with the table, `agree` compares the executors
-and looks for inputs on which they differ, `boards` emulates processors, `cortex` runs the C on a Cortex-M3,
-`esbmc` proves it; `apart` runs edited code in a process of its own; `mutants` and `code_mutants` try the suite itself; `figures`
-counts, `suite` is all of it on one screen.
+and looks for inputs on which they differ, `boards` emulates processors, `cortex` runs the C on a Cortex-M3, `target_coverage` has its
+compiler count what vectors reach, `esbmc` proves the C; `apart` runs edited code in a process of its own; `mutants` and
+`code_mutants` try the suite itself; `figures` counts, `suite` is all of it on one screen.
 """

@@ -11,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from rcsc.base.host.tools import BuildFailed, run_command, write_c
 
 OPTIMIZED = ("-std=c99", "-Os", "-ffreestanding", "-ffunction-sections", "-fdata-sections")
 COMPILE_S, RUN_S = 60.0, 300.0
+NOTHING: Mapping[str, Sequence[str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,7 @@ MEMORY {{ CODE (rx) : ORIGIN = {}, LENGTH = 4M
 ENTRY(reset)
 SECTIONS {{
   .text : {{ KEEP(*(.vectors)) KEEP(*(.reset)) *(.text*) *(.rodata*) *(.srodata*) . = ALIGN(8); }} > CODE
+  .gcov_info : {{ __gcov_info_start = .; KEEP(*(.gcov_info)) __gcov_info_end = .; }} > CODE
   .ARM.exidx : {{ *(.ARM.exidx*) }} > CODE
   .data : {{ *(.data*) *(.sdata*) . = ALIGN(8); }} > DATA
   .bss : {{ *(.bss*) *(.sbss*) *(COMMON) . = ALIGN(8); }} > DATA
@@ -221,8 +224,21 @@ void reset(void)
 """The C that an image begins with: `measure(call, state, seen)` calls and counts, `tell(name, seen, none)` prints."""
 
 
-def run_image(board: Board, place: Path, files: Mapping[str, str], image: str) -> str | BuildFailed:
+def run_image(
+    board: Board,
+    place: Path,
+    files: Mapping[str, str],
+    image: str,
+    counted: Mapping[str, Sequence[str]] = NOTHING,
+) -> str | BuildFailed:
     """Build the files and the image with it in a folder, as `image.elf`, and run it.
+
+    Args:
+        board: The processor.
+        place: The folder.
+        files: C and headers, text by path.
+        image: The C with `main`.
+        counted: More options for some files, by name, whose counters gcc keeps in the image.
 
     Returns:
         What it said.
@@ -234,10 +250,11 @@ def run_image(board: Board, place: Path, files: Mapping[str, str], image: str) -
     for source in (*write_c(files, place), "image.c"):
         objects.append(f"{Path(source).stem}.o")
         flags = ("-std=gnu11", "-O1", "-w", "-ffreestanding", "-I.") if source == "image.c" else OPTIMIZED
-        built = compiled(board, place, (*flags, "-I.", "-c", source, "-o", objects[-1]))
+        options = (*flags, *counted.get(source, ()), "-I.", "-c", source, "-o", objects[-1])
+        built = compiled(board, place, options)
         if isinstance(built, BuildFailed):
             return built
-    linked = link(board, place, objects, "image.elf")
+    linked = link(board, place, [*objects, *(["-lgcov"] if counted else [])], "image.elf")
     if isinstance(linked, BuildFailed):
         return linked
     ran = run_command([*board.emulator, "-kernel", "image.elf"], place, RUN_S)

@@ -27,7 +27,7 @@ from rcsc.lang.model import ProvedProgram
 from rcsc.lang.resolve import closure
 from rcsc.views.evidence import analysers, coverage, model_check, resources, runtime
 from rcsc.views.evidence.dossier import RECORD, Making, Part, heading, record, sha256
-from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.evidence.kind import Evidence, Kind, Missed, Shortfall, Subject
 from rcsc.views.evidence.misra import compliance
 from rcsc.views.evidence.whole import Whole
 from rcsc.views.evidence.whole import collect as collect_whole
@@ -79,7 +79,8 @@ def collect(
         of_one: dict[str, Evidence] = {}
         for name in names if not looks.code.lacking else ():
             settings.progress(f"{looks.root}: {name}")
-            of_one[name] = looks.at(name, settings.progress)
+            missed = of_one["coverage"].missed if "coverage" in of_one else None
+            of_one[name] = looks.at(name, missed, settings.progress)
             diagnostics += _findings(looks.root, name, of_one[name])
         diagnostics += looks.code.stale
         made[looks.name] = Part(looks.root, looks.tables, looks.code, of_one)
@@ -89,7 +90,7 @@ def collect(
     return Conclusion(project.report(tuple(diagnostics)), _closing(folder, made))
 
 
-Look = Callable[[str, Callable[[str], None]], Evidence]
+Look = Callable[[str, tuple[Missed, ...] | None, Callable[[str], None]], Evidence]
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +103,17 @@ class _Looks:
     code: CodeFound
     look: Look
 
-    def at(self, kind: str, progress: Callable[[str], None]) -> Evidence:
-        """Make evidence of a kind; of code that is not what the tables give, in a process of its own, which it may end."""
+    def at(self, kind: str, missed: tuple[Missed, ...] | None, progress: Callable[[str], None]) -> Evidence:
+        """Make evidence of a kind; of code that is not what the tables give, in a process of its own, which it may end.
+
+        Args:
+            kind: Its name.
+            missed: What was not covered, where that was measured before.
+            progress: Called with each step.
+        """
         if not self.code.stale:
-            return self.look(kind, progress)
-        made = apart(self.look, kind, progress=progress, silent_s=LONGEST_S)
+            return self.look(kind, missed, progress)
+        made = apart(self.look, kind, missed, progress=progress, silent_s=LONGEST_S)
         return Evidence((), shortfalls=(Shortfall(self.name, made.why),)) if isinstance(made, Ended) else made
 
 
@@ -133,12 +140,16 @@ def _subjects(
             yield _Looks(system.system.word, str(path), (str(path),), found, partial(_whole, system))
 
 
-def _looked(subject: Subject, kind: str, progress: Callable[[str], None]) -> Evidence:
-    return KINDS[kind].collect(replace(subject, progress=progress))
+def _looked(
+    subject: Subject, kind: str, missed: tuple[Missed, ...] | None, progress: Callable[[str], None]
+) -> Evidence:
+    return KINDS[kind].collect(replace(subject, progress=progress, missed=missed))
 
 
-def _whole(system: Whole, kind: str, progress: Callable[[str], None]) -> Evidence:
-    return collect_whole(replace(system, progress=progress), kind)
+def _whole(
+    system: Whole, kind: str, missed: tuple[Missed, ...] | None, progress: Callable[[str], None]
+) -> Evidence:
+    return collect_whole(replace(system, progress=progress, missed=missed), kind)
 
 
 def _subject(program: ProvedProgram, found: CodeFound, settings: Settings) -> Subject:

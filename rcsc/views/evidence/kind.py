@@ -20,6 +20,7 @@ class Subject:
         files: The generated files that are looked at, text by path below the generated folder.
         options: The options of proofs, where a kind makes some.
         progress: Called with each step.
+        missed: What was not covered, where that was measured before.
     """
 
     proved: ProvedProgram
@@ -27,6 +28,7 @@ class Subject:
     files: Mapping[str, str]
     options: Options
     progress: Callable[[str], None] = silent
+    missed: "tuple[Missed, ...] | None" = None
 
     @property
     def program(self) -> Program:
@@ -53,6 +55,21 @@ class Shortfall:
 
 
 @dataclass(frozen=True, slots=True)
+class Missed:
+    """A condition or statement that was not covered.
+
+    Attributes:
+        what: The condition, and the outcome that was not seen.
+        reason: The reason why it cannot be covered; empty where none is known.
+    """
+
+    function: str
+    line: int
+    what: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """The result of one kind for one program.
 
@@ -61,12 +78,14 @@ class Evidence:
         files: The files to keep, by path below the folder of the program and kind.
         shortfalls: The parts that are not shown; none for evidence that is whole.
         missing: The tool that is not installed, and what would install it; then nothing is shown.
+        missed: What was not covered, where that was measured; None where it was not.
     """
 
     figures: tuple[str, ...]
     files: Mapping[str, str] = field(default_factory=dict)
     shortfalls: tuple[Shortfall, ...] = ()
     missing: str = ""
+    missed: tuple[Missed, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from rcsc.code.testing.coverage.marks import Decision as Marked
 from rcsc.code.testing.coverage.marks import Place
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Admit, Bool, Kind, Level, Real, Table
-from rcsc.views.evidence.kind import Shortfall
+from rcsc.views.evidence.kind import Missed, Shortfall
 from rcsc.views.evidence.llvm import Decision, Measured, Point, Region
 
 LOOP = re.compile(r"v_\w+ <=? |more_\w+$|[ik] <=? ")
@@ -41,21 +41,6 @@ FAULTLESS = (
 PROVED = "the value was proved to lie there, wherever the function is called"
 NO_WAY = "no branch leads here: see those of this function"
 OTHER_LINE = "the table has no other line, and no other outcome is within reach"
-
-
-@dataclass(frozen=True, slots=True)
-class Missed:
-    """A condition or statement that was not covered.
-
-    Attributes:
-        what: The condition, and the outcome that was not seen.
-        reason: The reason why it cannot be covered; empty where none is known.
-    """
-
-    function: str
-    line: int
-    what: str
-    reason: str
 
 
 def uncovered(source: str, missed: Iterable[Missed]) -> list[Shortfall]:

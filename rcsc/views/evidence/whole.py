@@ -21,10 +21,10 @@ from rcsc.lang.restart import After, SameAs
 from rcsc.run.link import Linked
 from rcsc.run.link.wiring import End, LinkedLevel, Question
 from rcsc.views.evidence import analysers
-from rcsc.views.evidence.kind import Evidence, Shortfall
+from rcsc.views.evidence.kind import Evidence, Missed, Shortfall
 from rcsc.views.evidence.llvm import Measured, Point, measured, tools
 from rcsc.views.evidence.misra import compliance
-from rcsc.views.evidence.out_of_reach import Missed, uncovered
+from rcsc.views.evidence.out_of_reach import uncovered
 
 STEPS = 40_000
 """Steps of the drawn sessions: twice what reaches the last branch of the paper's system."""
@@ -37,11 +37,13 @@ class Whole:
     Attributes:
         files: The files that `rcsc compile` writes of it and of its levels, text by path.
         progress: Called with each step.
+        missed: What was not covered of the C, where that was measured before.
     """
 
     system: Linked
     files: Mapping[str, str]
     progress: Callable[[str], None] = silent
+    missed: tuple[Missed, ...] | None = None
 
     @property
     def source(self) -> str:
@@ -78,7 +80,7 @@ def _coverage(whole: Whole) -> Evidence:
     rows = [("line", "function", "what", "reason")]
     rows += [(str(each.line), each.function, each.what, each.reason) for each in missed]
     files = {"drawn.c": main, "coverage.txt": seen.text, "missed.csv": csv_text(rows)}
-    return Evidence(figures, files, tuple(short))
+    return Evidence(figures, files, tuple(short), missed=tuple(missed))
 
 
 def _missed(whole: Whole, seen: Measured) -> Iterator[Missed]:
@@ -125,7 +127,7 @@ LOOKS: Mapping[str, Callable[[Whole], Evidence]] = MappingProxyType(
     {
         "coverage": _coverage,
         "analysers": _analysers,
-        "misra": lambda whole: compliance.evidence_of(whole.files),
+        "misra": lambda whole: compliance.evidence_of(whole.files, whole.missed),
     }
 )
 PASSES: Mapping[str, str] = MappingProxyType(

@@ -8,20 +8,25 @@ pass everywhere.
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from rcsc.base.host.files import csv_text, read
-from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Shortfall
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Missed, Shortfall
 from rcsc.views.evidence.misra.cppcheck import (
     BASIC_TYPE,
     ENUMERATOR,
+    EXTENSION,
     HELD,
     MISSING,
+    NEVER_CHANGES,
+    NEVER_RUN,
     OWN,
+    SIZED,
     UNGUARDED,
+    ZERO,
     Checked,
     Finding,
     check,
@@ -39,12 +44,23 @@ ELSEWHERE: Mapping[str, str] = {
 """Guidelines that are not looked at here, and what looks at them."""
 SEARCHED: Mapping[str, str] = {
     "Dir 4.6": "a search of the text for basic types", "Dir 4.10": "a search of the headers for their guards",
+    "12.5": "a search of the text: sizeof is of types alone",
 }  # fmt: skip
 """Guidelines that are looked at here, beside cppcheck."""
+PARTLY: Mapping[str, str] = {
+    "2.1": "statements that no input reaches are listed by the kind `coverage`, which was not made with this one",
+    "2.2": "nobody looks for every operation without effect, such as a value that is written over before it is read",
+    "14.3": "conditions that no input changes are listed by the kind `coverage`, which was not made with this one",
+}
+"""Guidelines of which cppcheck sees a part, and who knows the rest: that cppcheck finds nothing is no compliance."""
+MEASURED = "the kind `coverage`: what no vector reaches, and why nothing can"
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _BASIC = re.compile(r"\b(char|short|int|long|float|double|signed|unsigned)\b")
 _ENUMERATOR = re.compile(r"^\s*([A-Z][A-Z0-9_]*)\s*=\s*-?\d+", re.MULTILINE)
 _HELD = re.compile(r"^static .*\b\w+_(?:atleast|atmost|within)_\w+\(", re.ASCII)
+_ZERO = re.compile(r" \+ 0\.0f?;")
+_EXTENSION = re.compile(r"__attribute__|#\s*pragma (?!STDC)")
+_SIZED = re.compile(r"\bsizeof\b(?!\s*\(\s*\w+_t\s*\))")
 _COMPARED = re.compile(r"(?:==|!=|<=|>=|<|>)\s*([A-Z][A-Z0-9_]*)\b")
 _GUARD = re.compile(r"^#ifndef (\w+)\n#define \1$", re.MULTILINE)
 _ONLY = ("stdbool.h", "stdint.h")
@@ -113,6 +129,15 @@ DEVIATIONS = (
         "defensive code: it changes no value that was proved, and says what was, so that an analyser of ranges follows",
     ),
     Deviation(
+        ZERO, "2.2", _ZERO.pattern,
+        "it takes -0.0 to 0.0, so that a state has one zero; of every other value it changes nothing",
+    ),
+    Deviation(
+        EXTENSION, "1.2", _EXTENSION.pattern,
+        "of GNU C, and only where the compiler says that it is that: so that no call is made, and each operation is rounded by itself; "
+        "others get plain C",
+    ),
+    Deviation(
         BASIC_TYPE, "Dir 4.6", r"\bdouble\b",
         "reals are IEEE binary64 as they were proved; the program tests when it runs that double is that",
     ),
@@ -148,6 +173,37 @@ def _declared(line: str, files: Mapping[str, str]) -> bool:
     return any(f"{name}(" in text for path, text in files.items() if path.endswith(".h"))
 
 
+SEARCHES: Mapping[str, str] = {
+    HELD: "a function that changes no value that was proved", ZERO: "an addition of 0.0",
+    EXTENSION: "an extension of a compiler", SIZED: "sizeof of what may be no type",
+}  # fmt: skip
+"""What is found at a place, in words."""
+
+
+def _uncovered(missed: Sequence[Missed], files: Mapping[str, str]) -> Iterator["ComplianceFinding"]:
+    """Yield what was not covered as statements that are never run (2.1), and conditions that never change (14.3)."""
+    texts = [(path.rpartition("/")[2], text) for path, text in files.items() if path.endswith(".c")]
+    for each in missed:
+        if each.what.startswith("condition "):  # of a decision, which changes all the same
+            continue
+        file = next(
+            (
+                name
+                for name, text in texts
+                if re.search(rf"^[^\n;]*\b{each.function}\([^;]*$", text, re.MULTILINE)
+            ),
+            "",
+        )
+        check = (
+            NEVER_CHANGES
+            if each.what.startswith("`") and not each.what.startswith(("`case ", "`default"))
+            else NEVER_RUN
+        )
+        reason = f"defensive code: it answers what was shown not to come; {each.reason}"
+        deviation = Deviation(check, OWN[check], "", reason) if each.reason else None
+        yield ComplianceFinding(Finding(file, each.line, check, f"not covered: {each.what}"), deviation)
+
+
 def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
     """Yield places that cppcheck does not look for: basic types, enumerators compared with objects, functions without effect."""
     bare = {
@@ -160,8 +216,10 @@ def own_findings(files: Mapping[str, str]) -> Iterator[Finding]:
                 yield Finding(file, at, BASIC_TYPE, f"basic type {found[1]}")
             if any(name in enumerators for name in _COMPARED.findall(line)):
                 yield Finding(file, at, ENUMERATOR, "an enumerator compared with an object")
-            if _HELD.search(line):
-                yield Finding(file, at, HELD, "a function that changes no value that was proved")
+            searched = ((HELD, _HELD), (ZERO, _ZERO), (EXTENSION, _EXTENSION), (SIZED, _SIZED))
+            yield from (
+                Finding(file, at, check, SEARCHES[check]) for check, what in searched if what.search(line)
+            )
 
 
 def _bare(text: str) -> str:
@@ -211,11 +269,13 @@ class Summary:
 
     Attributes:
         places: Every finding with its reason.
+        measured: Whether what was not covered is among them.
     """
 
     checked: Checked
     places: tuple[ComplianceFinding, ...]
     plain: bool
+    measured: bool = False
 
     @property
     def unexplained(self) -> tuple[ComplianceFinding, ...]:
@@ -228,6 +288,8 @@ class Summary:
         number, looks = guideline.number, self.checked.rules.get(guideline.number, "")
         own = [place for place in self.places if place.guideline == number]
         how = looks or SEARCHED.get(number, "") or ("a search of the text" if own else "")
+        known = self.measured and number in (OWN[NEVER_RUN], OWN[NEVER_CHANGES])
+        how = f"{how}; {MEASURED if known else PARTLY[number]}" if number in PARTLY else how
         if any(place in self.unexplained for place in own):
             return Compliance.VIOLATION, how
         if own:
@@ -235,17 +297,22 @@ class Summary:
         if number in UNUSED and self.plain:
             return Compliance.NOT_APPLICABLE, UNUSED[number]
         if how:
-            return Compliance.COMPLIANT, how
+            return Compliance.NOT_CHECKED if number in PARTLY and not known else Compliance.COMPLIANT, how
         return Compliance.NOT_CHECKED, f"not here: {ELSEWHERE[number]}" if number in ELSEWHERE else "nobody"
 
 
-def summary(files: Mapping[str, str]) -> Summary:
-    """Check C and headers, and explain the findings by their places."""
+def summary(files: Mapping[str, str], missed: Sequence[Missed] | None = None) -> Summary:
+    """Check C and headers, and explain the findings by their places.
+
+    Args:
+        files: Texts by path.
+        missed: What was not covered of the C; None where that was not measured.
+    """
     checked = check(files)
     findings = (*checked.findings, *own_findings(files), *_unguarded(files))
-    return Summary(
-        checked, tuple(ComplianceFinding(one, explained(one, files)) for one in findings), _plain(files)
-    )
+    places = [ComplianceFinding(one, explained(one, files)) for one in findings]
+    places += _uncovered(missed or (), files)
+    return Summary(checked, tuple(places), _plain(files), missed is not None)
 
 
 def _unguarded(files: Mapping[str, str]) -> Iterator[Finding]:
@@ -266,11 +333,11 @@ def _plain(files: Mapping[str, str]) -> bool:
 # --- as evidence -----------------------------------------------------------------------------
 
 
-def evidence_of(files: Mapping[str, str]) -> Evidence:
-    """Make the compliance table of C and its headers."""
+def evidence_of(files: Mapping[str, str], missed: Sequence[Missed] | None = None) -> Evidence:
+    """Make the compliance table of C and its headers; `missed` as of `summary`."""
     if not installed():
         return Evidence((), missing=MISSING)
-    made = summary(files)
+    made = summary(files, missed)
     if made.checked.failure:
         return Evidence((), missing=made.checked.failure)
     counts = Counter(made.of(one)[0] for one in guidelines())
@@ -286,7 +353,7 @@ def evidence_of(files: Mapping[str, str]) -> Evidence:
 
 KIND = Kind(
     "compliance with MISRA C:2012, guideline by guideline, each deviation with its place",
-    lambda subject: evidence_of(subject.files),
+    lambda subject: evidence_of(subject.files, subject.missed),
     lambda: {"cppcheck": engine() or ABSENT},
 )
 

