@@ -144,7 +144,7 @@ def test_the_matrix_leads_from_a_requirement_to_code_tests_and_proof_and_back(do
     assert (go["requirements"], go["requirements_of_table"]) == (["SR-12", "SR-13"], ["SR-1"])
     assert go["place"].endswith("door.rcs:12")
     taken = len(go["vectors"]["taken"])
-    assert go_stands["tests"] == f"{taken} {'vector' if taken == 1 else 'vectors'}"
+    assert go_stands["tests"] == f"{taken} {'vector' if taken == 1 else 'vectors'} of the tables"
     assert go_stands["coverage"] == f"{go['vectors']['shown']} of {go['vectors']['conditions']} conditions"
     assert go["properties"] == {"opened": "changes press; tests door_shut"}
     assert wait["procedures"] == ["hold", "quiet"]

@@ -40,7 +40,9 @@ tr:target { outline: 2px solid var(--accent); }
 _ABOUT = (
     "From requirements and lines of tables to generated code, tests and proofs, and back. Places of code are lines of a file, first "
     "and last. Vectors have the numbers of the file that <code>rcsc test --vectors</code> writes: those that show a condition of the line "
-    "to decide it, and those that take the line."
+    "to decide it, and those that take the line. Vectors are made of the tables: they test that the code does what the tables say. That "
+    "the tables say what is required is another matter: for a requirement of a property its verdict says so, of every run; tests of "
+    "requirements are scripts of orders (<code>rcsc run</code>) and watched episodes (<code>rcsc campaign</code>), which are kept apart."
 )
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 

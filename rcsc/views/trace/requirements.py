@@ -36,7 +36,7 @@ class Standing:
 
     Attributes:
         verdict: What is proved there.
-        tests: How many vectors take a line of it.
+        tests: How many vectors take a line of it: made of the tables, and not of what the requirement says.
         coverage: How many conditions of its lines a pair of vectors shows to decide them.
     """
 
@@ -102,7 +102,7 @@ def _standing(place: str, verdict: str, lines: Sequence[TracedLine]) -> Standing
     return Standing(
         place,
         verdict,
-        f"{len(vectors)} {'vector' if len(vectors) == 1 else 'vectors'}",
+        f"{len(vectors)} {'vector' if len(vectors) == 1 else 'vectors'} of the tables",
         f"{shown} of {every} conditions",
     )
 
