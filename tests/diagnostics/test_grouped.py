@@ -121,9 +121,7 @@ table t {
   | ten  | > 12      || 6 |
 }"""
     gap, overlap = sorted((finding for finding in reported(text)), key=lambda finding: finding.code.value)
-    assert gap.help == (
-        "a line `| new | 12 || ... |` closes this part of the gap and overlaps no other: proved",
-    )
+    assert gap.help == ("a line `| new | 12 || ... |` closes the gap and overlaps no other: proved",)
     assert overlap.help[0].startswith(
         "in line `six` write `7 .. 11` under `3 + b - a`: proved to part the two lines"
     )

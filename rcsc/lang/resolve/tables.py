@@ -133,8 +133,9 @@ def _in_its_mode(scope: Scope, written: tree.TableDecl, row: tree.Row) -> tree.R
     Source: Heitmeyer, Jeffords and Labaw, "Automated consistency checking of requirements specifications", ACM TOSEM 5(3), 1996:
     `@T(Inmode)` in a row of an event table is the event that the system enters the row's modes.
     """
-    pairs = zip(written.conditions, row.cells[1:], strict=False)
-    if not any(heading.subject is None and INMODE in cell.text for heading, cell in pairs):
+    alone = [at for at, heading in enumerate(written.conditions) if heading.subject is None]
+    said = {at for at in alone if at + 1 < len(row.cells) and INMODE in row.cells[at + 1].text}
+    if not said:
         return row
     first, mode = written.conditions[0], row.conditions[0]
     taken = INMODE in scope.declared or INMODE in scope.constants or INMODE in scope.members
@@ -142,8 +143,8 @@ def _in_its_mode(scope: Scope, written: tree.TableDecl, row: tree.Row) -> tree.R
         return row
     told = tree.term(first, mode)
     conditions = tuple(
-        _with_mode(written_, told) if heading.subject is None and INMODE in cell.text else written_
-        for heading, written_, cell in zip(written.conditions, row.conditions, row.cells[1:], strict=False)
+        _with_mode(condition, told) if at in said else condition
+        for at, condition in enumerate(row.conditions)
     )
     return replace(row, conditions=conditions)
 
