@@ -370,7 +370,7 @@ def _can_run(
     cycle, *firsts = (
         replace(each, contract=each.undeclared) for each in (inference.cycle, *inference.firsts)
     )
-    free = replace(inference, cycle=cycle, firsts=firsts)
+    free = replace(inference, cycle=cycle)
     others = [free.known(clauses), *(free.beginning(first) for first in firsts)]
     without = {answer(solver, term) for solver, term in zip(others, chosen, strict=True)}
     if Answer.SATISFIABLE in without:

@@ -369,14 +369,3 @@ def _is_plain(expr: Expr) -> bool:
 
 def _reads(condition: Expr, name: str) -> Read:
     return next(part for part in parts(condition) if isinstance(part, Read) and part.name == name)
-
-
-def _scaled(sum_: tuple[dict[int, int], int], factor: int) -> tuple[dict[int, int], int]:
-    return {column: k * factor for column, k in sum_[0].items()}, sum_[1] * factor
-
-
-def _sum(left: tuple[dict[int, int], int], right: tuple[dict[int, int], int]) -> tuple[dict[int, int], int]:
-    total = dict(left[0])
-    for column, k in right[0].items():
-        total[column] = total.get(column, 0) + k
-    return total, left[1] + right[1]
