@@ -105,6 +105,22 @@ def test_what_falls_ends(work: str, counters: set[tuple[str, bool]], tmp_path: P
     assert {(one.counter, one.falls) for one in found.counted if one.line == "2"} == counters
 
 
+def test_what_a_line_that_stops_sets_back_stops_other_lines(tmp_path: Path) -> None:
+    """Line 2 sets `d` back, and runs as often as `c` can fall: only without it does `d` fall for good."""
+    lower = lower_level(
+        going("2", on="true", does="work"),
+        going("3", on="false", does="sink"),
+        declared="state c : int 0 .. 9\nstate d : int 0 .. 9",
+        seen="on := d = 0",
+        begin="c := 9; d := 9",
+        work="if c > 0 { c := c - 1; d := 9 } else { cur_state := d_state }",
+        parts="procedure sink { d := max(d - 1, 0) }",
+    )
+    found = ending(tmp_path, lower)
+    assert (found.endless, found.proved) == ((), True)
+    assert found.counted == (RisingLine("2", "c", falls=True), RisingLine("3", "d", falls=True))
+
+
 def falling(work: str) -> str:
     """Return a lower level that works until `c` is 0."""
     declared = "state c : int 0 .. 99\nstate d : int 0 .. 99"
@@ -266,6 +282,39 @@ def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytes
     assert [one.still for one in looked] == [(), ("command", "there"), ("there",)]
     assert (found.still, found.endless) == (("there",), ())
     assert asked.rested_on == [(), ("there",)]
+
+
+def test_reports_have_to_stand_of_those_that_answer_and_get_no_orders_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked once inputs that stand still are not enough; then as few of these are looked for, with the reports."""
+    ts = small_level(tmp_path, "lower")
+    asked = SimpleNamespace(rested_on=[])
+    looked: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+    ordered = dict.fromkeys(("waits", "orders", "unread", "silent"))
+
+    def look(*_: object) -> object:
+        still, settled = looked[-1]
+        return SimpleNamespace(
+            solver=looked[-1],
+            counted=[],
+            endless=set() if settled and "there" in still else {0},
+            turn=SimpleNamespace(ordered=ordered),
+            orders_for_ever=lambda report: report == "orders",
+        )
+
+    def turns(still: tuple[str, ...], settled: tuple[str, ...]) -> object:
+        looked.append((still, settled))
+        return None
+
+    monkeypatch.setattr(ranking, "_Ranking", look)
+    monkeypatch.setattr(ranking, "_read_again", lambda *_: {"command", "there", "waits", "orders", "silent"})
+    outside, answering = {"command", "there"}, {"waits", "orders", "unread"}
+    found = ranking.lines_that_stop(ts.program, asked, (), turns, outside, answering)  # type: ignore[arg-type]  # what stands for them
+    assert (found.still, found.settled, found.endless) == (("there",), ("waits",), ())
+    both, alone = ("command", "there"), ("there",)
+    assert looked == [((), ()), (both, ()), (both, ("waits",)), (alone, ("waits",))]
+    assert asked.rested_on == [looked[0], looked[1], looked[3]]
 
 
 @pytest.mark.parametrize("seed", range(100))

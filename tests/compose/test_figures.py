@@ -18,23 +18,29 @@ from rcsc.compose.contract.claims import (
     Verdict,
     spelled,
 )
-from rcsc.compose.contract.environment import Above, links
+from rcsc.compose.contract.claims import RESTING as RESTS
+from rcsc.compose.contract.environment import Above, _admits, links
 from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
-from rcsc.compose.contract.properties import every_predicate
-from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.properties import _opened, every_predicate, properties
+from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
-from rcsc.compose.proof.assume_guarantee import _of_ending, of_level, promises
-from rcsc.compose.proof.level import LevelProof, _of_possible, certificate
-from rcsc.compose.proof.termination import Ending, Flow
+from rcsc.compose.proof import assume_guarantee
+from rcsc.compose.proof import system as system_proof
+from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
+from rcsc.compose.proof.context import lines_write, never_run
+from rcsc.compose.proof.level import LevelProof, _of_possible, certificate, prove_level
+from rcsc.compose.proof.termination import Ending, Flow, answered
+from rcsc.compose.proof.termination import from_outside as outside_inputs
 from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled as spelled_expression
-from rcsc.lang.model import Bool, Int, OneTable, TableName, VariableName
+from rcsc.lang.model import Bool, Enum, Int, Kind, OneTable, TableName, VariableName, earlier
 from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.keyed import Keyed
 from rcsc.run.description import BadDescription, Description, Wire, description
 from tests.support.programs.systems import (
+    LITTLE,
     SYSTEM,
     alone,
     going,
@@ -106,6 +112,16 @@ def test_pairs_of_lines_that_may_meet_are_stated_and_no_others(tmp_path: Path) -
     term = keyed.term(values.negation(values.equal(pair.holds, whole)))
     solver.add(*keyed.ranges, term)
     assert solver.check() is Answer.UNSATISFIABLE
+
+
+def test_a_new_command_may_be_passed_over_where_a_stopping_assumption_fails(upper: TransitionSystem) -> None:
+    tables = tuple(replace(table, stops=table.assumptions) for table in upper.program.tables)
+    stopping = replace(upper, program=replace(upper.program, tables=tables))
+    found = [
+        [(one.sort, one.table) for one in obligations(ts, any_cycle(ts)) if one.sort is Sort.ANSWERED]
+        for ts in (upper, stopping)
+    ]
+    assert found == [[], [(Sort.ANSWERED, "work")]]
 
 
 def without(sorts: tuple[Sort, ...], missing: str, table: str = "") -> tuple[Unstated, ...]:
@@ -197,6 +213,43 @@ def test_claims_of_a_level_rest_on_these_and_no_others(lower: tuple[TransitionSy
     assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *stands, *ends]
 
 
+def test_a_record_with_several_inputs_is_named_once(upper: TransitionSystem) -> None:
+    assert _said(upper, ["a.x", "a.y", "b.x", "c"], "here") == "`a`, `b.x`, `c` of level `upper` are here"
+    assert _said(upper, ["a.x"], "here") == "`a.x` of level `upper` is here"
+    assert _said(upper, [], "here") == ""
+
+
+def test_what_needs_that_no_input_is_refused_trusts_that(
+    lower: tuple[TransitionSystem, LevelProof], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ts, proof = lower
+    words = "no input is refused"
+    monkeypatch.setattr(assume_guarantee, "admitted", lambda _: (words,))
+    unproved = tuple((obligation, Verdict.NOT_PROVED) for obligation, _ in proof.verdicts)
+    refusing = replace(proof, verdicts=unproved, context=None, endings=(), stands=False)
+    resting = {RUNS, SAFE, ENDING, RESTS}
+    for parts_, trusted in (((refusing, proof), True), ((proof, proof), False), ((), False)):
+        claimed = [each for each in of_level(ts, replace(proof, parts=parts_)) if each[0] not in resting]
+        assert len(claimed) > len(proof.verdicts)
+        assert [key for key, claim in claimed if (words in claim.trusts) is not trusted] == []
+
+
+def test_a_leaf_that_is_written_before_and_after_the_lines_is_an_effect_of_theirs() -> None:
+    ts = alone(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nstate m : int 0 .. 9\nstate k : int 0 .. 9\n"
+        "procedure early { n := a  m := a }\nprocedure late { n := 1 }\n"
+        "table t {\n| line | when || k |\n| one | true || 1 |\n}\n"
+        "level l {\n  period 40 [ms]\n  preprocess early\n  table t\n  postprocess late\n}\n"
+    )
+    assert lines_write(ts) == ["n", "k"]
+
+
+def test_another_program_brings_its_own_level(upper: TransitionSystem) -> None:
+    short = replace(upper.level, preprocess=())
+    other = upper.of(replace(upper.program, levels=(short,)))
+    assert (other.level, other.program.levels) == (short, (short,))
+
+
 def test_what_levels_assume_of_each_other_is_told_word_for_word(
     upper: TransitionSystem, lower: tuple[TransitionSystem, LevelProof]
 ) -> None:
@@ -214,6 +267,10 @@ def test_what_levels_assume_of_each_other_is_told_word_for_word(
     from_above = Promise("lower", "command", orders, f"proved of `upper`: {Sort.NUMBERED.value}", kept)
     assert list(promises({"upper": upper, "lower": lower[0]})) == [from_outside, from_below, from_above]
     [below] = upper.links.below
+    deaf = replace(lower[0], links=replace(lower[0].links, above=None))
+    unnumbered = Promise("upper", "lower", reports, "`lower` takes no numbered orders", begins=False)
+    assert list(promises({"upper": upper, "lower": deaf})) == [from_outside, unnumbered]
+    assert outside_inputs(upper) == {"command"}
     left = replace(upper, links=replace(upper.links, below=(replace(below, outside=True),)))
     own = Promise("upper", "lower", reports, "`lower` stands outside the levels", own=kept, outside=True)
     assert list(promises({"upper": left})) == [from_outside, own]
@@ -316,6 +373,110 @@ def test_every_neighbour_that_is_not_understood_is_named(upper: TransitionSystem
     assert found.unread == (said,)
 
 
+def test_single_values_that_go_both_ways_are_no_order_and_its_report(
+    lower: tuple[TransitionSystem, LevelProof],
+) -> None:
+    program = lower[0].program
+    said = replace(program.variable(VariableName("there")), name=VariableName("said"), kind=Kind.OUTPUT)
+    system = wired(("station.there", "lower.there"), ("lower.said", "station.said"))
+    found = links(system, "lower", replace(program, variables=(*program.variables, said)))
+    assert found.unread == (
+        "no input has `inc_command` and `input_command`, so that no order selects the table",
+    )
+
+
+def test_what_comes_from_a_level_and_is_no_order_is_named(lower: tuple[TransitionSystem, LevelProof]) -> None:
+    found = links(wired(("upper.idle", "lower.there")), "lower", lower[0].program)
+    missing = "`inc_command`, `input_command`, `inc_command_echo`, `ref_command_echo`"
+    assert found.unread[0] == f"what `lower` and `upper` say to each other (`there`) has no {missing}"
+
+
+def test_a_member_is_taken_from_the_same_enumeration_alone() -> None:
+    colours, others, number = Enum("c", ("a", "b")), Enum("d", ("a", "b")), Int(0, 1)
+    assert [_admits(colours, given) for given in (colours, others, Enum("c", ("b", "a")), number, Bool())] == [
+        True, True, False, False, False,
+    ]  # fmt: skip
+    assert [_admits(number, given) for given in (number, Int(0, 2), Int(1, 1), colours)] == [
+        True, False, True, False,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_who_is_no_level_stands_outside(outside: bool, upper: TransitionSystem) -> None:
+    system = description(SYSTEM)
+    levels = tuple(level for level in system.levels if not outside or level.name != "lower")
+    found = links(replace(system, levels=levels), "upper", upper.program)
+    assert [below.outside for below in found.below] == [outside]
+
+
+def test_each_level_is_proved_with_the_effort_that_is_asked_for(
+    upper: TransitionSystem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(system_proof, "_proved", lambda *args: args)
+    found: list[object] = list(system_proof._each({"a": upper, "b": upper}, LITTLE, 1, ("a", "b"), None))
+    assert found == [("a", (upper, LITTLE, None)), ("b", (upper, LITTLE, None))]
+
+
+def test_each_table_is_matched_on_what_it_sees_at_its_place() -> None:
+    ts = alone(
+        "state n : int 0 .. 9\nstate m : int 0 .. 9\n"
+        "table t {\n| line | n || n |\n| one | < 5 || 7 |\n| two | >= 5 || 1 |\n}\n"
+        "table u {\n| line | n || m |\n| one | < 5 || n |\n| two | >= 5 || 1 |\n}\n"
+        "level l {\n  period 40 [ms]\n  table t\n  table u\n}\n"
+    )
+    kept = ts.program.line_leaves[TableName("t")]
+    assert [ts.lines_before({kept: at}) for at in range(3)] == [(), (("t", "one"),), (("t", "two"),)]
+    cycle = any_cycle(ts)
+    same = [
+        values.equal(one, two)
+        for at in cycle.every
+        for one, two in zip(at.matches, ts.matches(cycle, at.table, {}), strict=True)
+    ]
+    keyed, solver = Keyed(), Solver()
+    term = keyed.term(values.negation(values.all_of(same)))
+    solver.add(*keyed.ranges, term)
+    assert len(same) == 4
+    assert solver.check() is Answer.UNSATISFIABLE
+
+
+# --- cycles that end early ----------------------------------------------------------------
+
+
+def test_a_cycle_in_which_an_input_is_refused_takes_nothing_and_runs_nothing(
+    upper: TransitionSystem,
+) -> None:
+    cycle = any_cycle(upper.refusing())
+    early = [cycle.refused, cycle.unmatched, cycle.interrupted]
+    still = [
+        values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in ("cur_state", "to_lower.inc_command")
+    ]
+    idle = [values.negation(at.chosen) for at in cycle.every]
+    keyed, solver = Keyed(), Solver()
+    term = keyed.term(values.both(cycle.untaken, values.negation(values.all_of([*early, *still, *idle]))))
+    solver.add(*keyed.ranges, term)
+    assert solver.check() is Answer.UNSATISFIABLE
+    assert cycle.untaken is not values.FALSE
+
+
+def test_each_part_of_a_property_that_reads_a_refused_input_is_true_or_false() -> None:
+    ts = alone(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nproperty low : not (a < 3 and n > a) implies n < 9\n"
+        "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
+    )
+    [stated] = ts.program.properties
+    node = _opened(stated.condition, frozenset({"a"}), ts.havoc())
+    assert set(values.variables([node])) == {f"{REFUSED}: (< a int:3)", f"{REFUSED}: (> n a)", "n"}
+
+
+def test_what_a_property_looks_back_at_is_any_value_after_a_refused_input() -> None:
+    ts = alone(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nproperty back : was a < 5 or n < 9\n"
+        "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
+    ).refusing()
+    [(_, node)] = properties(ts.program, any_cycle(ts))
+    assert f"{REFUSED}: (< {earlier('a')} int:5)" in values.variables([node])
+
+
 # --- from table to table ------------------------------------------------------------------
 
 
@@ -324,6 +485,7 @@ def test_every_neighbour_that_is_not_understood_is_named(upper: TransitionSystem
     [
         ("which := go", set()),
         ("which := pause", set()),
+        ("which := which", set()),
         ("if which = pause { which := go } else { which := pause }", {0, 1}),
     ],
 )
@@ -343,6 +505,64 @@ def test_tables_go_round_only_where_each_may_follow_the_other(
     cycle = any_cycle(ts)
     flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
     assert flow._looping_tables() == round_
+
+
+def test_a_subordinate_that_has_to_stand_has_answered_and_gets_no_order(upper: TransitionSystem) -> None:
+    cycle = any_cycle(upper)
+    flow = Flow(upper, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
+    for settled, may_order in (((), Answer.SATISFIABLE), (("lower",), Answer.UNSATISFIABLE)):
+        turn = flow._turn(cycle, 1, settled)
+        for wrong in (turn.ordered["lower"], values.negation(turn.answered)):
+            keyed, solver = Keyed(), Solver()
+            term = keyed.term(values.both(turn.stays, wrong))
+            solver.add(*keyed.ranges, term)
+            assert solver.check() is may_order
+
+
+def test_an_order_that_is_late_counts_as_answered_but_for_one_to_rest(upper: TransitionSystem) -> None:
+    """Only of a subordinate that is to answer in time."""
+    cycle, [below] = any_cycle(upper), upper.links.below
+    in_time = replace(below, late="idle", answers_in_time=True)
+    rests = values.equal(cycle.before[below.command], values.constant(upper.kinds[below.command], 0))
+    late = cycle.middle["idle"]
+    plain, timed = answered(upper, cycle, below), answered(upper, cycle, in_time)
+    meant = values.either(plain, values.both(late, values.negation(rests)))
+    keyed, solver = Keyed(), Solver()
+    term = keyed.term(values.negation(values.equal(timed, meant)))
+    solver.add(*keyed.ranges, term)
+    assert solver.check() is Answer.UNSATISFIABLE
+    assert answered(upper, cycle, replace(in_time, answers_in_time=False)).op == plain.op
+    assert timed.op != plain.op
+
+
+def test_a_flag_that_turns_while_a_command_waits_is_no_phase(tmp_path: Path) -> None:
+    text = lower_level(
+        going("2", on="false", does="work"),
+        going("3", on="true", does="state(d_state)", status="done"),
+        declared="state flip : bool",
+        work="flip := not flip",
+    )
+    ts = small_level(tmp_path, "lower", lower=text)
+    cycle = any_cycle(ts)
+    flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
+    assert [str(at.table.name) for at in flow.tables] == ["pause", "go"]
+    assert "flip" in flow._pending_and_flags()
+    assert "flip" in flow._phases(0).leaves
+    assert "flip" not in flow._phases(1).leaves
+
+
+def test_of_lines_that_ran_it_is_not_asked_whether_they_never_do(upper: TransitionSystem) -> None:
+    cycle = any_cycle(upper)
+    asked = Confirmation((), (), cycle, cycle.cases, Keyed(), Limits())
+    lines = [(str(at.table.name), str(line.name)) for at in cycle.every for line, _ in at.lines]
+    assert len(never_run(asked, (), lines[1:])) == 1
+    assert never_run(asked, (), lines) == []
+
+
+def test_members_are_of_one_sort_wherever_they_stand() -> None:
+    keyed, kind = Keyed(), Enum("c", ("a", "b", "c"))
+    sorts = {str(term.sort()) for term in (keyed.variable("m", kind), keyed.literal(kind, 1))}  # type: ignore[attr-defined]  # a Z3 term
+    assert len(sorts) == 1
 
 
 # --- what has a name of its own -----------------------------------------------------------
@@ -441,7 +661,11 @@ def test_the_questions_of_a_certificate_are_named_and_are_about_values_in_range(
     lower: tuple[TransitionSystem, LevelProof],
 ) -> None:
     asked = certificate(*lower)
-    assert [name for name in asked if not name.startswith(("lines", "ends"))] == [
+    others = [name for name in asked if name.startswith(("lines", "ends"))]
+    assert {"lines 1", "ends pause 1", "ends go 1"}.issubset(others)
+    assert not any(name.endswith(" 0") for name in others)
+    assert "lines and endings as before" not in asked
+    assert [name for name in asked if name not in others] == [
         "first", "restart", "step pause", "step go", "goals first", "goals restart",
         "goals some_line", "goals one_line", "goals echoes", "goals done_stays", "goals failed_stays", "goals once", "stands 1",
     ]  # fmt: skip
@@ -450,3 +674,16 @@ def test_the_questions_of_a_certificate_are_named_and_are_about_values_in_range(
             if line.startswith("(declare-fun |command.inc_command") or "inc_command_seen ()" in line:
                 name = line.removeprefix("(declare-fun ").partition(" () ")[0]
                 assert f"(and (<= 0 {name}) (>= 65535 {name}))" in text
+
+
+def test_a_cycle_that_runs_no_table_is_a_step_of_its_own() -> None:
+    """Here, where an input is refused."""
+    ts = alone(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\ninvariant few : n < 5\n"
+        "table t {\n| line | a || n |\n| one | < 5 || 1 |\n| two | >= 5 || 2 |\n}\n"
+        "level l {\n  period 40 [ms]\n  table t\n}\n"
+    )
+    asked = certificate(ts, prove_level(ts, LITTLE))
+    assert [name for name in asked if not name.startswith("goals")] == [
+        "first", "restart", "step t", "step of no table", "lines 1",
+    ]  # fmt: skip

@@ -10,9 +10,11 @@ from rcsc.base.diagnostics.render import full, plain
 from rcsc.base.diagnostics.source import Source
 from rcsc.lang.model import Backing
 from rcsc.proof.procedures.discharge import Asker, Discharge
+from rcsc.proof.procedures.invariants import properties_elsewhere
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.table import program as proving
 from rcsc.proof.table import relational
 from rcsc.proof.table.confirm import Agreement, confirm
 from rcsc.proof.table.decide import prove_table
@@ -262,6 +264,26 @@ def test_a_table_with_a_condition_that_is_not_defined_is_left_open_at_no_cost() 
     [found] = prove_program(program_of(text), Options()).tables
     assert found.findings == (Undecided("a condition is not defined for every input"),)
     assert (found.backing.method, found.backing.confirmed_by_z3, found.seconds) == ("none", False, 0.0)
+
+
+def test_one_property_is_told_as_one() -> None:
+    program = program_of("state n : int 0 .. 9\nproperty kept : n <= 9\n")
+    [told_] = properties_elsewhere(program)
+    assert told_.message == "property `kept` is not proved here"
+
+
+def test_what_ends_a_proof_is_told_word_for_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        message = "no room"
+        raise MemoryError(message)
+
+    monkeypatch.setattr(proving, "prove_table", full)
+    text = "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
+    [found] = prove_program(program_of(text), Options()).tables
+    assert found.findings == (Undecided("MemoryError: no room"),)
+    with smt.until(lambda: True):
+        [found] = prove_program(program_of(text), Options()).tables
+    assert found.findings == (Undecided("nobody waits for the answer"),)
 
 
 def test_what_the_clock_cut_short_is_told_word_for_word(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -270,6 +270,15 @@ def test_a_part_of_the_way_lies_between(one: float, other: float, part: float) -
     assert low <= part_way(low, high, part) <= high
 
 
+def test_a_part_of_the_way_is_that_part_also_where_the_difference_is_beyond_all_doubles() -> None:
+    assert [part_way(-1.5e308, 1.5e308, part) for part in (0.0, 0.25, 0.5, 1.0)] == [
+        -1.5e308,
+        -7.5e307,
+        0.0,
+        1.5e308,
+    ]
+
+
 def test_the_points_that_are_tried_are_always_the_same() -> None:
     kinds: dict[str, Scalar] = {"i": Int(-1, 9), "r": Real(-1.0, 8.0), "p": Bool()}
     variables = [Variable(VariableName(name), Kind.INPUT, kind, 0) for name, kind in kinds.items()]

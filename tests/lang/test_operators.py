@@ -50,7 +50,16 @@ from rcsc.lang.model import (
     single_key,
     single_of_key,
 )
-from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison, single, spell_single
+from rcsc.lang.operator_table import (
+    LOGIC,
+    Arithmetic,
+    Comparison,
+    Core,
+    _halfway,
+    is_comparison,
+    single,
+    spell_single,
+)
 from rcsc.proof.certify.execution import Run, Start
 from rcsc.proof.certify.settle import script, values_in
 from rcsc.proof.certify.values import Term, Terms, sort_of
@@ -332,6 +341,11 @@ def test_a_single_is_spelled_as_the_shortest_number_that_is_read_back() -> None:
         exact = abs(Fraction(text) - Fraction(value))
         others = [single_of_key(single_key(value) + by) for by in (-1, 1)]
         assert all(exact < abs(Fraction(text) - Fraction(other)) for other in others), (value, text)
+
+
+def test_a_double_is_halfway_where_as_far_from_two_singles() -> None:
+    found = [_halfway(one) for one in (1.0, 1.0 + 2**-23, 1.0 + 2**-24, -(3.0 + 2**-23), 1e300 * 1e300)]
+    assert found == [False, False, True, True, False]
 
 
 def test_what_no_machine_can_do_is_owed() -> None:

@@ -10,7 +10,7 @@ import pytest
 from rcsc.base.host.tools import c_compiler
 from rcsc.code.testing.agree import AgreementCount, run_session
 from rcsc.code.testing.executors.sessions import Stimuli
-from rcsc.lang.interpret import Fault, cycle, initial, run_table
+from rcsc.lang.interpret import Fault, call, chosen_table, cycle, initial, run_stage, run_table, settle
 from rcsc.lang.model import Enum, Kind, Program, Value
 from tests.emit.test_agreement import executors_of, found_of
 from tests.stages.test_proof import drawn
@@ -354,3 +354,29 @@ def test_lines_that_are_called_by_numbers_have_members_that_can_be_written() -> 
     assert kind.members == ("none", "line_1_2", "line_1")
     with executors_of(program) as executors:
         assert list(found_of(executors, AgreementCount(), 20)) == []
+
+
+@pytest.mark.parametrize(
+    ("water", "pressure", "overridden"), list(product((5, 9, 15), range(3), (False, True)))
+)
+def test_one_table_after_the_other_leaves_what_the_cycle_does(
+    water: int, pressure: int, overridden: bool
+) -> None:
+    program = program_of(REACTOR)
+    [level] = program.levels
+    start = {
+        **initial(program),
+        "water": water,
+        "pressure": pressure,
+        "overridden": overridden,
+        "reset": True,
+    }
+    now = dict(start)
+    settle(program, now)
+    for name in level.preprocess:
+        call(program, name, [], now)
+    for choice in level.choices:
+        assert run_stage(program, chosen_table(program, choice, now), now) is Fault.OK
+    for name in level.postprocess:
+        call(program, name, [], now)
+    assert now == cycle(program, level, start).snapshot

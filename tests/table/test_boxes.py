@@ -1,7 +1,7 @@
 """Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations, pairwise, permutations, product
 from typing import Any, Literal
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.interpret import fold, matching_lines
 from rcsc.lang.interval_sets import holds, joined, meet
-from rcsc.lang.model import Box, Program, Scalar, key_bounds, key_of, value_of_key
+from rcsc.lang.model import Box, Program, Scalar, key_bounds, key_of, real_key, value_of_key
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.solvers.search import furthest, halved
@@ -23,6 +23,7 @@ from rcsc.proof.table.decide import prove_table
 from rcsc.proof.table.diagnose import diagnostics
 from rcsc.proof.table.program import prove_program
 from rcsc.proof.table.regions import holes, partition
+from rcsc.proof.table.regions.ends import Ends
 from rcsc.proof.table.repair import Partings, new_line
 from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench.made import families
@@ -605,3 +606,63 @@ def test_ranges_that_touch_over_the_widest_types_are_told_in_few_steps(kind: str
     overlaps = [each for each in found if each.code is Code.OVERLAP]
     assert len(overlaps) == 2
     assert any("together: proved that no two lines match any more" in note for note in overlaps[-1].notes)
+
+
+def test_keys_are_shown_as_values_of_their_types() -> None:
+    program = program_of(
+        "input n : int 1 .. 9\ninput p : bool\ninput r : real -1.0 .. 1.0\nenum e { a, b, c }\ninput m : e\n"
+        "table t {\n| line | n | p | r | m ||\n| one | < 5 | true | < 0.5 | in {b, c} ||\n}\n"
+    )
+    table = boxes.TableBoxes.of(program, program.tables[0])
+    assert table.witness({}) == {"n": 1, "p": False, "r": -1.0, "m": 0}
+    shown = table.witness({"n": 3, "p": 1, "r": real_key(0.5), "m": 2})
+    assert shown == {"n": 3, "p": True, "r": 0.5, "m": 2}
+    assert [type(value) for value in shown.values()] == [int, bool, float, int]
+
+
+def test_a_search_goes_on_only_where_lines_do_not_fill_a_slice() -> None:
+    """Of ten slices of `a` one is not filled, though a line that does not look at `a` is in all of them."""
+    lines: list[Mapping[str, Box]] = [
+        {"b": ((0, 4),)},
+        {"a": ((0, 8),), "b": ((5, 9),)},
+        {"a": ((9, 9),), "b": ((5, 8),)},
+    ]
+    gaps = partition.Gaps.of(partition.Boxes({"a": (0, 9), "b": (0, 9)}, lines), disjoint=True)
+    [(bounds, _)] = gaps._short(0, 7, gaps._axes(())["a"], gaps.pieces)
+    assert bounds == (9, 9)
+    assert gaps.least(()) == {"a": (9, 9), "b": (9, 9)}
+
+
+def test_what_is_not_defined_at_an_input_that_z3_gives_does_not_hold_there() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\ntable t {\n| line | 9 / a ||\n| x | > 2 ||\n| y | <= 2 ||\n}\n"
+    )
+    [test] = program.tables[0].lines[0].stated
+    assert [confirming._is_so(test, {"a": a}) for a in (0, 1, 9)] == [False, True, False]
+
+
+def test_z3_is_asked_of_a_gap_at_the_input_that_is_known() -> None:
+    """To find one takes it more steps than it gets."""
+    program = program_of(
+        "input a : int 0 .. 1000000\ninput b : int 0 .. 1000000\ninput c : int 0 .. 1000000\n"
+        "table t {\n| line | when ||\n| one | a * b * c /= 999923001838986077 ||\n}\n"
+    )
+    gap = Gap(({"a": 999983, "b": 999979, "c": 999961},), (None,))
+    asked = program, program.tables[0], (gap,), Options(solver="both", steps=20_000)
+    assert confirm(*asked) is Agreement.AGREES
+
+
+def test_the_cut_is_the_one_that_leaves_most_on_its_lesser_side() -> None:
+    ends = Ends({at: [(0, (2 * at, 2 * at + 1))] for at in range(4)})
+    best, kept = holes._best(holes._Part({}, ends.everyone, ends.cuts))
+    assert best is not None
+    assert (best.at, [cut.at for cut in kept]) == (3, [-1, 1, 3, 5, 7])
+
+
+def test_of_a_word_the_patterns_of_the_bits_that_lines_read_are_counted() -> None:
+    program = program_of(
+        "input w : int 0 .. 255\ntable t {\n| line | w ||\n| a | 0bxxxxxx1x ||\n| b | 0bxxxxxx00 ||\n}\n"
+    )
+    [gap] = prove_table(program, program.tables[0], BOXES).findings
+    assert isinstance(gap, Gap)
+    assert (gap.witnesses, gap.count, gap.patterns) == (({"w": 1},), (64, 256), (1, 4))

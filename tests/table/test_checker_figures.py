@@ -2,23 +2,29 @@
 
 import json
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
 from itertools import combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rcsc.lang.model import Bool, Int, Program, Real
+from rcsc.lang.interpret import evaluate
+from rcsc.lang.model import Apply, Bool, Box, Int, Program, Real, Single, Snapshot, key_of, real_key
 from rcsc.proof.certify import certify
-from rcsc.proof.certify.execution import Start
+from rcsc.proof.certify.execution import Run, Start
 from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.owed import Debts
-from rcsc.proof.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
+from rcsc.proof.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, _edges, script, values_in
+from rcsc.proof.certify.shape import WITNESS
+from rcsc.proof.certify.table import All, AnyOf, Formula, RejectedError, TableChecker
 from rcsc.proof.certify.values import (
     BOOL,
     FREE,
     INT,
     REAL,
+    SINGLE,
     TRUTHS,
     Term,
     Terms,
@@ -102,6 +108,12 @@ def test_a_question_is_written_as_smt_lib_has_it() -> None:
     assert prelude.splitlines()[0] == "(set-logic ALL)"
 
 
+def test_singles_are_written_by_their_bits() -> None:
+    asked = script([MAKE("<", TERMS.variable("s", Single(-1.5, 2.0)), TERMS.constant(SINGLE, -0.5))])
+    assert "(define-fun t2 () Bool (fp.lt v0 (fp #b1 #b01111110 #b00000000000000000000000)))" in asked
+    assert "(fp.leq (fp #b1 #b01111111 #b10000000000000000000000) v0)" in asked
+
+
 # --- columns ------------------------------------------------------------------------------
 
 COLUMNS = {
@@ -125,6 +137,7 @@ COLUMNS = {
         (MAKE("/", NUMBER, OTHER), [4, -1], np.int64),
         (MAKE("mod", NUMBER, OTHER), [0, -1], np.int64),
         (MAKE("int", DOUBLE), [0, 1], np.int64),
+        (MAKE("int", MAKE("/", DOUBLE, MAKE("-", DOUBLE, DOUBLE))), [0, 0], np.object_),
         (MAKE("real", NUMBER), [4.0, -3.0], np.float64),
         (whole(3), [3, 3], np.int64),
         (TERMS.choice(TRUTH, NUMBER, OTHER), [1, -3], np.int64),
@@ -151,6 +164,11 @@ def test_a_constant_past_the_machine_word_is_one_of_python_s_numbers() -> None:
     assert found.tolist() == [1 - 2**63]
     either = TERMS.choice(TRUTH, whole(2**63 + 1), whole(-1))
     assert values_in(either, COLUMNS, 2).tolist() == [-1, 2**63 + 1]
+    large = TERMS.choice(TRUTH, whole(2**61), whole(3))
+    assert values_in(MAKE("*", large, large), COLUMNS, 2).tolist() == [9, 2**122]
+    far = TERMS.variable("far", Real(0.0, 4.0e18))
+    squared = MAKE("*", MAKE("int", far), MAKE("int", far))
+    assert values_in(squared, {far: np.array([4.0e18, 3.0])}, 2).tolist() == [16 * 10**36, 9]
 
 
 # --- terms --------------------------------------------------------------------------------
@@ -390,6 +408,29 @@ def test_obligations_are_settled_as_they_can_be_and_what_it_took_is_counted() ->
     assert settled([], FAR, CaseAnswer.SOME) == (Fails(()), work)
 
 
+def test_the_values_with_which_a_program_begins_are_tried() -> None:
+    never = TERMS.negation(MAKE("=", MAKE("*", DOUBLE, double(10.0)), double(3.0)))
+    for first, outcome in (({"x": 0.3}, Fails), ({"x": 0.0}, Left)):
+        found = Settler(TERMS, None, first).settle([], TERMS.true, never, KnownSpans((), ()))
+        assert isinstance(found, outcome)
+
+
+def test_all_cases_are_tried_that_hypotheses_leave() -> None:
+    many = TERMS.variable("v", Int(0, 10**12))
+    few = MAKE("<", many, whole(5))
+    assert settled([few], TERMS.negation(MAKE("=", MAKE("*", many, many), whole(7))))[0] == Shown()
+
+
+def test_constants_and_their_neighbours_are_tried() -> None:
+    edges = _edges(TERMS.every((MAKE("<", NUMBER, whole(7)), MAKE("<", DOUBLE, double(0.5)), TRUTH)))
+    assert edges == {
+        BOOL: [0, 1],
+        INT: [-1, 0, 1, 6, 7, 8],
+        REAL: [-1.0, -0.5, 0.0, 0.5, 1.0, 1.5],
+        SINGLE: [-1.0, 0.0, 1.0],
+    }
+
+
 # --- what is owed -------------------------------------------------------------------------
 
 OWED = """\
@@ -496,6 +537,46 @@ def test_what_a_program_owes_is_named_and_placed() -> None:
     assert found == OWED.splitlines()
 
 
+def test_no_invariant_that_reads_an_input_holds_at_first() -> None:
+    """Nothing says what the input is then, and what it is declared to begin with would satisfy it."""
+    program = program_of(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nassume low monitored : a < 5\ninvariant few : n < 5\n"
+        "table t {\n| line | a ||\n| d | DEFAULT ||\n}\n"
+    )
+    for condition, good in (
+        (program.invariants[0].condition, True),
+        (program.assumptions[0].condition, False),
+    ):
+        stated = replace(program, invariants=(replace(program.invariants[0], condition=condition),))
+        start = Start(stated)
+        [owed] = next(iter(Debts(stated, start).all())).owed
+        assert (owed.name, owed.good) == (
+            "at first: invariant `few` holds",
+            start.terms.true if good else start.terms.false,
+        )
+
+
+def test_what_an_action_writes_twice_it_has_written_wherever_it_did_once() -> None:
+    start = Start(
+        program_of("input p : bool\nstate n : int 0 .. 9\ntable t {\n| line | p ||\n| d | DEFAULT ||\n}\n")
+    )
+    run, terms, p = Run(start, ""), start.terms, start.leaves["p"]
+    one, two = terms.constant(INT, 1), terms.constant(INT, 2)
+    run.write("n", one, terms.true)
+    run.write("n", two, p)
+    assert run.state.wrote["n"] is terms.true
+    assert run.state.leaves["n"] is terms.choice(p, two, one)
+
+
+def test_a_condition_that_several_lines_state_is_owed_once() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\ninput p : bool\ntable t {\n| line | 9 / a | p ||\n| one | > 2 | true ||\n"
+        "| two | > 2 | false ||\n| three | <= 2 | ||\n}\n"
+    )
+    names = [owed.name for debt in Debts(program, Start(program)).all() for owed in debt.owed]
+    assert names.count("a condition of table `t`: the divisor is not zero") == 2
+
+
 LONG = """
 input a : int 0 .. 9
 state n : int 0 .. 9
@@ -567,11 +648,58 @@ def test_what_is_wrong_with_a_tree_is_told_word_for_word() -> None:
     [entry] = certificate["tables"]
     for tree, words in [
         (entry["tree"][:-1], "the tree leaves a region out"),
+        ([["s", 0, 10**9]], "a split is out of its region"),
         ([*entry["tree"], ["l", 0]], "the tree has more nodes than regions"),
         ([["l", 0]], "a leaf does not hold: ['l', 0]"),
     ]:
         cut = certificate | {"tables": [entry | {"tree": tree}]}
         assert certify(program, cut).problems == (f"table `t`: {words}",)
+
+
+@pytest.mark.parametrize(
+    ("default", "right"),
+    [("", False), ("| d | DEFAULT unreachable ||\n", False), ("| d | DEFAULT ||\n", True)],
+)
+def test_only_what_falls_to_default_may_be_left_without_a_line(default: str, right: bool) -> None:
+    program = program_of(
+        f"input x : int 0 .. 20\ntable t {{\n| line | x ||\n| one | < 5 ||\n| two | in {{7, 9}} ||\n{default}}}\n"
+    )
+    [table] = program.tables
+    tree = [["s", 0, 4], ["l", 0], ["s", 0, 8], ["l", -1], ["l", -1]]
+    entry: dict[str, Any] = {"assumptions": [], "columns": ["x"], "forms": [[[0, 1]]], "tree": tree}
+    with nullcontext() if right else pytest.raises(RejectedError, match=r"a leaf does not hold: \['l', -1\]"):
+        TableChecker(Start(program), table, entry).check()
+
+
+def test_values_of_others_than_are_read_are_refused_word_for_word() -> None:
+    program = program_of(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\nassume near monitored : x < 5\n"
+        "table t assuming near {\n| line | x ||\n| one | < 3 ||\n| two | 3 .. 4 ||\n}\n"
+    )
+    certificate = json.loads(json.dumps(prove_program(program, Options()).certificate))
+    assert certify(program, certificate).whole
+    certificate["tables"][0][WITNESS]["y"] = 1
+    words = "table `t`: values of others than its assumptions and invariants read are given"
+    assert certify(program, certificate).problems == (words,)
+
+
+def test_bounds_of_the_first_form_may_show_that_a_region_is_empty() -> None:
+    """Of `x - y`, which is negative, `x`, which is positive, and `y`, which is not."""
+    program = program_of(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n| one | x < y ||\n| two | x >= y ||\n}\n"
+    )
+    tree = [
+        ["s", 0, -1],
+        ["s", 1, 4],
+        ["l", 0],
+        ["s", 2, 4],
+        ["e", [[0, 1], [1, -1], [2, 1]]],
+        ["l", 0],
+        ["l", 1],
+    ]
+    forms = [[[0, 1], [1, -1]], [[0, 1]], [[1, 1]]]
+    entry: dict[str, Any] = {"assumptions": [], "columns": ["x", "y"], "forms": forms, "tree": tree}
+    TableChecker(Start(program), program.tables[0], entry).check()
 
 
 def test_several_cells_may_be_about_one_form() -> None:
@@ -581,3 +709,136 @@ def test_several_cells_may_be_about_one_form() -> None:
     )
     found = certify(program, json.loads(json.dumps(prove_program(program, Options()).certificate)))
     assert (found.problems, found.unchecked) == ((), ())
+
+
+# --- conditions ---------------------------------------------------------------------------
+
+READ = [
+    *(f"p or x - x {op} {constant}" for op in ("<", "<=", "=", "/=", ">=", ">") for constant in (-1, 0, 1)),
+    *(f"2 * x - 3 * y {op} {constant}" for op in ("<", "<=", "=", "/=", ">=", ">") for constant in (-2, 1)),
+    *(f"y - x {op} 2 * y - 1" for op in ("<", "=", ">=")),
+    *("-2 * x = 3 - 2 * y", "x * y < 3", "x * 2 + y * (1 + 1) /= 7", "x in {0, 3}", "p", "p = q", "p /= q"),
+    *(
+        "p and q",
+        "p or x < y",
+        "p xor q",
+        "p implies x = y",
+        "p = (x < y)",
+        "(x < y) /= (y < 3)",
+        "false = q",
+    ),
+    "not (p and x + y > 4) or x = 2 and y in {1, 4}",
+    "(x < 2 or x > 3) and x + y /= 4",
+    *("r < s", "not (r = s)", "-r <= s", "r >= 0.5 or s /= 0.0", "p and r > s", "r * s < 0.5 and x < 2"),
+]
+"""Conditions over two whole numbers, two truths and two doubles."""
+RANGES = {
+    "x": range(5),
+    "y": range(5),
+    "p": (False, True),
+    "q": (False, True),
+    "r": (-1.0, 0.0, 0.5),
+    "s": (-0.5, 0.0),
+}
+NAMED = (
+    "input x : int 0 .. 4\ninput y : int 0 .. 4\ninput p : bool\ninput q : bool\n"
+    "input r : real -1.0 .. 0.5\ninput s : real -0.5 .. 0.0\n"
+)
+AT = [dict(zip(RANGES, values, strict=True)) for values in product(*RANGES.values())]
+
+
+def checker_of(*conditions: str) -> TableChecker:
+    """A checker of a table with these lines, and a DEFAULT."""
+    rows = "".join(f"| l{at} | {condition} ||\n" for at, condition in enumerate(conditions))
+    program = program_of(f"{NAMED}table t {{\n| line | when ||\n{rows}| d | DEFAULT ||\n}}\n")
+    entry: dict[str, Any] = {"assumptions": [], "columns": [], "forms": [], "tree": []}
+    return TableChecker(Start(program), program.tables[0], entry)
+
+
+def true_at(formula: Formula, checker: TableChecker, point: Snapshot) -> bool:
+    """Whether a formula of the checker is true at a point, each of its terms as the interpreter has it."""
+    if isinstance(formula, All | AnyOf):
+        parts = [true_at(part, checker, point) for part in formula.parts]
+        return all(parts) if isinstance(formula, All) else any(parts)
+    form, box = formula
+    terms = checker.terms.terms
+    value = sum(k * key_of(terms[name].type, evaluate(terms[name], point)) for name, k in form)
+    return any(low <= value <= high for low, high in box)
+
+
+@pytest.mark.parametrize("condition", READ)
+def test_a_condition_is_read_and_judged_as_the_interpreter_has_it(condition: str) -> None:
+    """At every input, also where it is negated; in a narrower region at each input there."""
+    checker = checker_of(condition)
+    [test] = [test for test in checker.table.lines[0].tests if test is not None]
+    bounds = {(("x", 1),): (1, 2), (("x", 2), ("y", -3)): (0, 4), (("q", 1),): (1, 1)}
+    for yes in (True, False):
+        read = checker.terms.formula(test.condition, yes)
+        inside = checker.judge(read, bounds)
+        for point in AT:
+            true = evaluate(test.condition, point) is yes
+            assert true_at(read, checker, point) is true, point
+            if point["x"] in (1, 2) and 0 <= 2 * int(point["x"]) - 3 * int(point["y"]) <= 4 and point["q"]:
+                assert true_at(inside, checker, point) is true, point
+
+
+def test_a_condition_of_one_leaf_is_a_box_also_where_its_values_are_many() -> None:
+    program = program_of(
+        "input w : int 0 .. 1000000\ntable t {\n| line | when ||\n"
+        "| one | (w < 100 or w > 5000) and w /= 7 ||\n| d | DEFAULT ||\n}\n"
+    )
+    entry: dict[str, Any] = {"assumptions": [], "columns": [], "forms": [], "tree": []}
+    checker = TableChecker(Start(program), program.tables[0], entry)
+    [test] = [test for test in program.tables[0].lines[0].tests if test is not None]
+    assert checker.condition(test.condition) == ((("w", 1),), ((0, 6), (8, 99), (5001, 10**6)))
+
+
+@pytest.mark.parametrize(
+    ("condition", "box"),
+    [
+        ("x * x > 3", ((2, 4),)),
+        ("12 / (5 - x) > 3", ((2, 4),)),
+        ("x mod 2 = 0", ((0, 0), (2, 2), (4, 4))),
+        ("12 / (x - 2) > 3", None),
+    ],
+)
+def test_a_condition_of_one_leaf_is_tried_at_all_its_values_and_no_others(
+    condition: str, box: Box | None
+) -> None:
+    """One more would be undefined of the second; the last one is."""
+    checker = checker_of(f"{condition} or p")
+    [test] = [test for test in checker.table.lines[0].tests if test is not None]
+    assert isinstance(test.condition, Apply)
+    assert checker.tried(test.condition.args[0], "x") == box
+
+
+HALF, ONE, GREAT = real_key(0.5), real_key(1.0), 2**64
+REGIONS: list[tuple[dict[str, int], int, int]] = [
+    ({"x": 1}, 1, 2), ({"p": 1}, 0, 0), ({"x": 2, "y": -3}, -1, 4), ({"p": 1, "x": 1}, 1, 3), ({"r": 1}, 0, HALF),
+    ({"r": 1}, -ONE, 0), ({"r": 1}, -GREAT, GREAT), ({"r": 1, "s": -1}, 1, GREAT), ({"r": 1, "s": -1}, 0, GREAT),
+    ({"r": 1, "s": -1}, -GREAT, 0), ({"r": 1, "s": -1}, -GREAT, -1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "low", "high"), REGIONS)
+def test_what_is_left_of_a_region_is_asked_of_all_its_inputs_and_no_others(
+    form: dict[str, int], low: int, high: int
+) -> None:
+    checker = checker_of("x < y or r < 0.0", "p or s = 0.0", "x >= y")
+    for name in form:
+        checker.terms.name(checker.terms.terms[name])
+    assert checker.left({tuple(form.items()): (low, high)}, [0, 2])
+    [debt] = checker.questions
+    [owed] = debt.owed
+    cases = {checker.start.leaves[name]: np.array([point[name] for point in AT]) for name in RANGES}
+    known, good = (
+        np.broadcast_to(values_in(term, cases, len(AT)), len(AT))
+        for term in (checker.start.terms.every(debt.hypotheses), owed.good)
+    )
+    kinds = {name: checker.start.types[name] for name in form}
+    for number, point in enumerate(AT):
+        value = sum(k * key_of(kinds[name], point[name]) for name, k in form.items())
+        assert known[number] == (low <= value <= high), point
+        assert good[number] == (
+            not ((point["x"] < point["y"] or point["r"] < 0.0) and point["x"] >= point["y"])
+        )

@@ -50,6 +50,7 @@ def test_an_invariant_holds_after_a_restart_too() -> None:
     [found] = verdict_of(BEGUN_ANEW).findings
     assert (found.code.value, found.notes) == ("RCS416", ("after a restart place = 50",))
     assert "after a restart" in found.message
+    assert found.help == ("give a variable another value for `restart`, or weaken the invariant",)
     assert [BEGUN_ANEW[label.span.start : label.span.end] for label in found.related] == ["place"]
     for kept in ("restart 7", "restart 0", ""):
         assert errors(verdict_of(edited(BEGUN_ANEW, ("restart 50", kept))).findings) == []

@@ -1,10 +1,13 @@
 """What procedures, lines and conditions owe: each kind found at its line, and nothing found where all is well."""
 
+import operator
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import z3
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,13 +16,19 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.front.commands import run
 from rcsc.lang.expressions.intervals import may_be_undefined
-from rcsc.lang.model import Int
+from rcsc.lang.model import NOWHERE, Apply, Int, OneTable, Op, Real, Scalar, Single
+from rcsc.lang.operator_table import Arithmetic
+from rcsc.proof.procedures.discharge import Asker, Discharge
 from rcsc.proof.procedures.obligations import Obligations
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import TOGETHER, Limits, Options
 from rcsc.proof.solvers.smt import Answer, Solver, Term
-from rcsc.proof.symbolic.encode import within
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.encode import declared, encode, least_where, within
+from rcsc.proof.symbolic.evaluation import Obligation
 from rcsc.proof.symbolic.execution import Run
+from rcsc.proof.symbolic.remembered import Answers, remembering
+from rcsc.proof.symbolic.values import Node
 from rcsc.proof.table.program import prove_program
 from tests.support.programs.stages import BOXES, codes, drawn_program, program_of, verdict_of
 from tests.support.programs.texts import edited
@@ -97,6 +106,7 @@ WRONG = [
     ("n := a + 1", "RCS413"),
     ("m := 100 / b", "RCS411"),
     ("m := 100 mod b", "RCS411"),
+    ("m := 100 / int(yes)", "RCS411"),
     ("if b /= 0 or 100 / b > 3 { n := 1 }", "RCS411"),
     ("if b = 0 implies 100 / b > 3 { n := 1 }", "RCS411"),
     ("if 100 / b > 3 and b /= 0 { n := 1 }", "RCS411"),
@@ -689,3 +699,209 @@ def test_what_types_show_to_be_defined_owes_nothing(drawn: tuple[Names, str, str
     run = Run({}, {v.name: v.type for v in program.variables}, {})
     run.evaluate(condition)
     assert may_be_undefined(condition) or not run.obligations
+
+
+# --- what is asked ------------------------------------------------------------------------
+
+WORD = Int(0, 99)
+
+
+@pytest.mark.parametrize("constant", [-1, 0, 5, 7, 8, 11, 15, 16])
+@pytest.mark.parametrize(
+    ("made", "meant"), [(smt.equal, operator.eq), (smt.at_most, operator.le), (smt.below, operator.lt)]
+)
+def test_bits_are_compared_with_any_whole_number(
+    made: Callable[[Term, Term, Scalar], Term], meant: Callable[[int, int], bool], constant: int
+) -> None:
+    """Also with one that has more bits than they have."""
+    bits, other = smt.word("w", 3), smt.literal(WORD, constant)
+    for value in range(8):
+        here = [(bits, smt.literal(WORD, value))]
+        assert str(smt.at_point(made(bits, other, WORD), here)) == str(meant(value, constant))
+        assert str(smt.at_point(made(other, bits, WORD), here)) == str(meant(constant, value))
+
+
+@pytest.mark.parametrize("divisor", [1, 2, 3, 4, 8, 16])
+def test_bits_are_divided_by_any_whole_number(divisor: int) -> None:
+    bits, by = smt.word("w", 3), smt.literal(WORD, divisor)
+    for value in range(8):
+        here = [(bits, smt.literal(WORD, value))]
+        for op, meant in (("/", value // divisor), ("mod", value % divisor)):
+            same = smt.equal(smt.integer_operation(op, bits, by), smt.literal(WORD, meant), WORD)
+            assert str(smt.at_point(same, here)) == "True"
+
+
+@pytest.mark.parametrize("op", [Op.DIV, Op.MOD, Op.MUL])
+def test_bits_are_taken_of_what_is_never_negative_and_divided_by_a_power_of_two(op: Arithmetic) -> None:
+    kind = Int(-1, 9)
+    whole, either = values.variable("w", Int(0, 9)), values.variable("v", kind)
+    power, others = values.constant(kind, 8), [values.constant(kind, by) for by in (-1, 0, 3)]
+    taken = [
+        values.takes_bits(Node(op, (value, divisor), kind, -1, 9))
+        for value, divisor in (
+            (whole, power),
+            (either, power),
+            *((whole, by) for by in (*others, either, whole)),
+        )
+    ]
+    assert taken == [op is not Op.MUL, *[False] * 6]
+    among = values.variable("p", Int(4, 8))
+    assert not values.takes_bits(Node(op, (whole, among), kind, 0, 9))
+
+
+def test_constants_that_stand_for_terms_are_told_apart_and_counted() -> None:
+    solver, kind = Solver(counted_alone=True), Int(0, 9)
+    x = smt.variable("x", kind)
+    double, more = (solver.named(smt.integer_operation(op, x, smt.literal(kind, 2))) for op in ("*", "+"))
+    switch = solver.switch(smt.below(smt.literal(kind, 4), x, kind))
+    solver.add(smt.equal(x, smt.literal(kind, 4), kind))
+    assert solver.check() is Answer.SATISFIABLE
+    assert (solver.value(double, kind), solver.value(more, kind)) == (8, 6)
+    assert solver.check(switch) is Answer.UNSATISFIABLE
+    assert solver.names == 3
+
+
+@pytest.mark.parametrize("kind", [Real(-1.0, 1.0), Single(-1.0, 1.0)])
+def test_doubles_and_singles_are_compared_with_constants_of_their_own(kind: Real) -> None:
+    x = smt.variable("x", kind)
+    for value in (-0.5, 0.0, 0.5):
+        half = smt.at_most(smt.literal(kind, 0.5), x, kind)
+        assert str(smt.at_point(half, [(x, smt.literal(kind, value))])) == str(value >= 0.5)
+
+
+def test_all_that_is_asserted_is_stated_again_after_a_question_is_broken_off() -> None:
+    kind = Int(0, 99)
+    x = smt.variable("x", kind)
+
+    def is_(value: int) -> Term:
+        return smt.equal(x, smt.literal(kind, value), kind)
+
+    def below(value: int) -> Term:
+        return smt.below(x, smt.literal(kind, value), kind)
+
+    solver = Solver(remembers=True)
+    solver.add(smt.negation(below(3)))
+    solver.add(below(50))
+    solver.push()
+    solver.add(below(40))
+    solver.add(smt.negation(is_(7)))
+    for broken in (False, True):
+        answers = []
+        for value in (2, 3, 7, 45, 60):
+            solver._broken = broken
+            answers.append(solver.check(is_(value)) is Answer.SATISFIABLE)
+        assert answers == [False, True, False, False, False]
+    solver.pop()
+    again = z3.Solver()
+    again.from_string(solver.refutations())
+    assert again.check() == z3.unsat
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_only_a_witness_that_is_wanted_is_looked_for(wanted: bool) -> None:
+    a = values.variable("a", Int(0, 9))
+    owed = Obligation(Code.INDEX, "", NOWHERE, values.TRUE, values.inside(a, 0, 4))
+    asker = Asker(Options(), {"a": 0})
+    [failure] = asker.unshown([owed], list, lambda _: wanted)
+    assert failure.outcome is Discharge.FAILS
+    assert [value for _, value in failure.witness] == [5] * wanted
+    assert (asker.tally.queries > 2) is wanted
+    with smt.until(lambda: True):
+        [given_up] = asker.unshown([owed], list, lambda _: wanted)
+    assert (given_up.outcome, given_up.witness) == (Discharge.OPEN, ())
+
+
+@pytest.mark.parametrize("kind", [Int(0, 10), Real(0.0, 10.0)])
+@pytest.mark.parametrize("most", [4, 6])
+def test_one_question_shows_that_all_holds_of_whole_numbers_and_of_doubles(kind: Scalar, most: int) -> None:
+    x = values.variable("x", kind)
+    owed = Obligation(Code.ASSIGNED_RANGE, "", NOWHERE, values.TRUE, values.inside(x, 0, 5))
+    asker = Asker(Options(), {"x": 0})
+    assert asker.all_hold([owed], lambda: [values.inside(x, 0, most)]) is (most == 4)
+
+
+def test_answers_are_remembered_each_to_its_own_question() -> None:
+    a = values.variable("a", Int(0, 9))
+    owed = Obligation(Code.INDEX, "", NOWHERE, values.TRUE, values.inside(a, 0, 4))
+    asker = Asker(Options(), {"a": 0})
+    with remembering(Answers()):
+        for _ in range(2):
+            shown, plain = (
+                asker.unshown([owed], list, lambda _: True),
+                asker.unshown([owed], list, lambda _: False),
+            )
+            assert [[value for _, value in one.witness] for one in (*shown, *plain)] == [[5], []]
+            assert asker.all_hold([owed], list) is False
+
+
+def test_the_least_input_at_which_conditions_hold_is_found() -> None:
+    program = program_of(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ninput w : int 0 .. 255\ntable t {\n| line | when ||\n"
+        "| one | x + y = 11 and w = 0bx1xxxx1x ||\n| d | DEFAULT ||\n}\n"
+    )
+    conditions = [test.condition for test in program.tables[0].lines[0].stated]
+    found = least_where(conditions, program.variables, program.variables, Options())
+    assert found == {"x": 2, "y": 9, "w": 0b01000010}
+
+
+def test_a_calculation_of_doubles_that_has_a_name_is_known_by_it_and_others_are_not() -> None:
+    program = program_of(
+        "input r : real -1.0 .. 1.0\ninput s : real -1.0 .. 1.0\ntable t {\n| line | when ||\n"
+        "| one | r * s < 0.5 ||\n| two | (r * s) + r < 0.5 ||\n| d | DEFAULT ||\n}\n"
+    )
+    one, two = (line.stated[0].condition for line in program.tables[0].lines)
+    frame, _ = declared(program.variables)
+    assert isinstance(one, Apply)
+    frame.named[one.args[0]] = smt.variable("known", Real(-1.0, 1.0))
+    assert str(encode(one, frame)) == "known < 1*(2**-1)"
+    assert str(encode(two, frame)) == "known + r < 1*(2**-1)"
+
+
+def test_a_table_runs_its_default_where_no_line_matches() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\ntable t {\n| line | a || n |\n| one | < 3 || 1 |\n"
+        "| two | > 7 || 2 |\n| d | DEFAULT || 3 |\n}\n"
+    )
+    [table] = program.tables
+    running = Run.of(program, {})
+    running.run_choice(OneTable(table.name), {str(table.name): table})
+    after, kind = values.term_of(running.state.leaves["n"]), program.kinds["n"]
+    for a, n in ((0, 1), (3, 3), (7, 3), (8, 2)):
+        here = [(smt.variable("a", kind), smt.literal(kind, a))]
+        assert str(smt.at_point(smt.equal(after, smt.literal(kind, n), kind), here)) == "True"
+
+
+def test_what_a_cycle_leaves_is_of_its_type() -> None:
+    """Also the numbers of the lines that ran, which begin at none."""
+    program = program_of(
+        "input a : bool\nstate n : int 0 .. 9 deferred until a\n"
+        "table t {\n| line | a || n |\n| one | true || 1 |\n| two | false || 2 |\n}\n"
+        "table u {\n| line | n ||\n| one | <= 9 ||\n}\nlevel l {\n  table t\n  table u\n}\n"
+    )
+    settled = Run.of(program, {})
+    settled.settle(program)
+    assert program.line_leaves
+    assert settled.state.leaves.keys() == {"n", *program.line_leaves.values()}
+    assert {name: node.kind for name, node in settled.state.leaves.items()} == {
+        name: program.kinds[name] for name in settled.state.leaves
+    }
+
+
+def test_parameters_of_a_procedure_that_nobody_calls_are_apart() -> None:
+    apart = "state n : int 0 .. 9\nprocedure p(k : int 0 .. 3, j : int 0 .. 3) { n := k - j }\n"
+    [found] = verdict_of(apart).findings
+    [shown] = found.witnesses
+    assert (found.code, shown.variables, shown.values) == (Code.ASSIGNED_RANGE, ("j", "k"), ("1", "0"))
+
+
+def test_what_goes_wrong_in_several_lines_is_one_cause_with_three_witnesses() -> None:
+    rows = "".join(f"| l{at} | {at} || wrong |\n" for at in range(5))
+    program = program_of(
+        f"input a : int 0 .. 4\ninput b : int 0 .. 9\nstate n : int 0 .. 8\nprocedure wrong {{ n := b }}\n"
+        f"table t {{\n| line | a || procedures |\n{rows}}}\n"
+    )
+    owed = Obligations(program, Options())
+    [found] = owed.prove(program.tables)
+    assert found.notes == tuple(f"in line `l{at}` of table `t`" for at in range(3))
+    [cause] = owed._causes.values()
+    assert [bool(failure.witness) for failure in cause.failures] == [True, True, True, False, False]

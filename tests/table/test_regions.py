@@ -45,6 +45,7 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.proof.solvers import smt
 from rcsc.proof.table import relational
 from rcsc.proof.table.confirm import TableSolver
 from rcsc.proof.table.decide import prove_table
@@ -63,11 +64,12 @@ from rcsc.proof.table.regions.region import (
     Only,
     Open,
     OutsideAssumption,
+    Question,
     Search,
     Split,
 )
 from rcsc.proof.table.regions.splitting import Tree
-from rcsc.proof.table.verdict import Gap, Overlap
+from rcsc.proof.table.verdict import DeadLine, Gap, Overlap, Undecided
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
@@ -386,6 +388,16 @@ def test_whatever_input_the_solver_gives_of_a_region_the_rest_is_asked_for(
     assert [gap.witnesses[0] for gap in findings if isinstance(gap, Gap)] == [{"x": 1, "y": 5}]
 
 
+def test_of_several_gaps_the_least_input_is_told() -> None:
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n"
+        "| a | x + y < 5 ||\n| b | x + y > 6 and x - y /= 3 ||\n}\n"
+    )
+    [gap] = prove_table(program, program.tables[0], BOXES).findings
+    assert isinstance(gap, Gap)
+    assert gap.witnesses == ({"x": 0, "y": 5},)
+
+
 @pytest.mark.parametrize("lines", [12, 80])
 @pytest.mark.parametrize("default", ["", "| d | DEFAULT ||\n"])
 def test_the_least_gap_of_planes_is_told_with_few_lines_and_with_many(
@@ -535,12 +547,69 @@ def test_a_term_that_is_not_linear_is_left_to_the_solver() -> None:
     assert not odd.proved
 
 
-def test_past_the_budget_nothing_is_proved() -> None:
+def test_a_comparison_of_what_may_be_infinite_is_one_truth() -> None:
+    program = compiled(
+        "input r : real 0.0 .. 1.0e200\ntable t {\n| line | when ||\n| a | r * r > 1.0 ||\n| b | not (r * r > 1.0) ||\n}\n"
+    )
+    universe, search = searched(program)
+    assert len(universe.forms) == 1
+    assert search.proved
+
+
+def test_what_holds_everywhere_is_in_the_way_of_no_count() -> None:
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n"
+        "| a | (x < y or x >= y) and x /= 5 ||\n| b | x = 5 ||\n}\n"
+    )
+    assert searched(program)[1].proved
+
+
+@pytest.mark.parametrize("known", [{0: 3, 1: 4}, None])
+def test_an_input_that_is_known_shows_two_lines_meet_where_no_other_is_found(
+    known: dict[int, int] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n| a | x + y < 8 ||\n| b | x + y >= 7 ||\n}\n"
+    )
+    monkeypatch.setattr(relational, "least", lambda *_: NoWitness.UNKNOWN)
+    monkeypatch.setattr(TableSolver, "witness", lambda *_, **__: None)
+    decision = relational._Decision(program, program.tables[0], BOXES)
+    decision._tried = ()
+    found = decision.overlap(0, 1, known, grown=False).finding
+    assert found == (Undecided("lines `a` and `b`") if known is None else Overlap(0, 1, {"x": 3, "y": 4}))
+
+
+def test_inputs_of_a_region_that_one_line_matches_show_nothing_wrong() -> None:
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n| a | x * y < 7 ||\n| b | x * y >= 7 ||\n}\n"
+    )
+    decision = relational._Decision(program, program.tables[0], BOXES)
+    assert decision.oracle(Question((), (0, 1))) is NoWitness.NONE
+    tried = relational._Decision(program, program.tables[0], BOXES)
+    assert isinstance(tried.oracle(Question((), (0,))), dict)
+    assert (decision.by_solver, tried.by_solver) == (True, False)
+
+
+def test_what_is_not_looked_for_any_more_is_not_told_of() -> None:
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
+        "table t {\n| line | when ||\n| a | x + y < 7 ||\n| b | x + y >= 7 ||\n| c | x + y > 10 and x - y > 9 ||\n}\n"
+    )
+    decision = relational._Decision(program, program.tables[0], BOXES)
+    with smt.until(lambda: True):
+        assert decision.dead() == []
+    assert decision.dead() == [DeadLine(2, False)]
+
+
+@pytest.mark.parametrize("asked", [0, splitting.MOST_PAST])
+def test_past_the_budget_nothing_is_proved(asked: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each region that is left it is said so, whether the solver is asked about some or not."""
+    monkeypatch.setattr(splitting, "MOST_PAST", asked)
     program = program_of(orders(5))
     universe = Universe()
     lines = lines_of(universe, program.tables[0])
     search = Tree(universe, lines, (), lambda _: NoWitness.UNKNOWN, default=False, budget=50).run()
-    assert search.undecided
+    assert search.undecided == search.nodes.count(Open()) > 3
     assert not search.proved
 
 

@@ -175,6 +175,21 @@ table t assuming is_calm {
     assert "assumption `is_calm` (assumed)" in outcome.rests_on
 
 
+def test_lines_with_the_same_actions_do_the_same_whatever_these_are() -> None:
+    text = """
+input a : int 0 .. 9
+output x : int 0 .. 9
+extern procedure outside reads a writes x python "my.own:outside" c "outside"
+table t {
+  | line          | a   || procedures |
+  | low           | < 6 || outside    |
+  | high same low | > 3 || outside    |
+}"""
+    found = certify(program_of(text), dict(verdict_of(text).certificate or {}))
+    assert found.whole
+    assert "lines `low` and `high` of table `t` do the same: their actions are the same" in found.checked
+
+
 def test_an_invariant_may_be_needed_and_what_is_undecided_fails() -> None:
     text = """
 input a : int 0 .. 9
