@@ -21,7 +21,7 @@ from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import Program
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.decide import prove_table
-from rcsc.proof.table.mending import Outcome, written
+from rcsc.proof.table.mending import Outcome, names_of, written
 from rcsc.proof.table.repair import PartingCell, Partings, new_line
 from rcsc.proof.table.verdict import Gap, Overlap
 from tests.support.programs.systems import solo_system
@@ -54,7 +54,7 @@ def held(folder: Path, rng: Rng) -> Counter[Outcome]:
 
 
 def _cells(text: Text) -> Iterator[tuple[After, PartingCell | Change]]:
-    names = [str(line.name) for line in text.table.lines]
+    names = names_of(text.table)
     pairs = sorted(sorted(map(names.index, pair)) for pair in (text.before.pairs if text.before else ()))
     for first, second in pairs[:MOST_PAIRS]:
         every = Partings(text.ts.program, text.table).cells(Overlap(first, second, {}))

@@ -24,7 +24,7 @@ MOST_S = 16.0
 """Processor time that all may take, but for what it takes to find them."""
 MOST_OF_A_ROOM_S = 0.8
 """Of tests of a room none of whose files is on the list."""
-MOST_OF_A_FILE_S = 4.0
+MOST_OF_A_FILE_S = 3.5
 """Time that the cases of a file may take in the ordinary run."""
 KEPT = frozenset(
     {
