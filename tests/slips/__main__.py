@@ -1,6 +1,6 @@
 """Draw slips in the generated C of the shipped levels, play the vectors on each, and say what became of them.
 
-`python -m tests.slips` takes some minutes a level; `tests/emit/test_slips.py` plays a sample.
+`python -m tests.slips` takes some minutes a level; `tests/slips/test_slips.py` plays a sample.
 """
 
 import argparse
