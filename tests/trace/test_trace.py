@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -362,3 +363,29 @@ def test_a_requirement_has_a_standing(
     [stands] = [row for row in rows if row["place"] == "property opened" and row["requirement"] == "SR-12"]
     assert stands["verdict"] == f"{REFUTED}, system.toml"
     assert '<span class="bad">not proved: ' in Path("trace/trace.html").read_text(encoding="utf-8")
+
+
+def test_rows_of_scripts_test_requirements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Told apart from the vectors, which are made of the tables; of a script of another kind there is nothing to tell."""
+    folder = tmp_path / "dock"
+    shutil.copytree(REPO / "tests/data/dock", folder, ignore=shutil.ignore_patterns("generated"))
+    monkeypatch.chdir(tmp_path)
+    edit_file(
+        folder / "dock.csv", ("command\ndock\nstop\nundock", 'command,req\ndock,R-1\nstop,\nundock,"R-1 R-2"')
+    )
+    (folder / "scripts").mkdir()
+    (folder / "scripts/slow.toml").write_text('[[row]]\ncommand = "dock"\nwithin = 900\nreq = "R-2"\n')
+    (folder / "scripts/other.csv").write_text("a,a\n1,2\n")
+    assert run(["trace", "-q", "--no-vectors", "dock"]) == 0
+    rows = list(csv.reader(Path("trace/requirements.csv").read_text("utf-8").splitlines()))
+    assert [row for row in rows if row[0].startswith("R-")] == [
+        ["R-1", "row of script dock.csv 1", "", "`dock`, made by `rcsc run`", ""],
+        ["R-1", "row of script dock.csv 3", "", "`undock`, made by `rcsc run`", ""],
+        ["R-2", "row of script dock.csv 3", "", "`undock`, made by `rcsc run`", ""],
+        ["R-2", "row of script slow.toml 1", "", "`dock within=900`, made by `rcsc run`", ""],
+    ]
+    programs = json.loads(Path("trace/trace.json").read_text("utf-8"))["programs"]
+    places = [one["place"] for matrix in programs for one in matrix["declared"] if "script" in one["sort"]]
+    assert places == ["dock/dock.csv:2", "dock/dock.csv:4", "dock/scripts/slow.toml"]
+    edit_file(folder / "dock.csv", ("command,req", "command,command"))
+    assert run(["trace", "-q", "--no-vectors", "dock"]) == 1

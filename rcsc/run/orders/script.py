@@ -7,7 +7,8 @@ the field that has the command), the end of a buffer from outside (`base.bumper`
 - `cycles`: how long the row takes, whatever is reported; without it an order takes until it is done or failed;
 - `within`: how many cycles it may take at most;
 - `expect`: how it is to end where that is not `done`;
-- `fault`: the plant's faults that are on while the row is under way, parted by spaces.
+- `fault`: the plant's faults that are on while the row is under way, parted by spaces;
+- `req`: the requirements that the row tests, parted by spaces; `rcsc trace` has them, and a run looks at none.
 
     command,target_mm,expect
     goto,500,
@@ -30,7 +31,8 @@ from rcsc.run.orders.roles import DONE, Served, field_of, served
 from rcsc.run.signature import Leaf, Signature, Value
 
 COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT = "command", "level", "cycles", "within", "expect", "fault"
-OWN = (COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT)
+REQ = "req"
+OWN = (COMMAND, LEVEL, CYCLES, WITHIN, EXPECT, FAULT, REQ)
 """Columns that are no field of an order."""
 MOST_ROWS, MOST_CYCLES = 100_000, 10_000_000
 
@@ -134,15 +136,7 @@ def read_script(
     Raises:
         BadScript: The file cannot be read, or a row says what cannot be; all that is wrong is told.
     """
-    try:
-        content = text(path, MIB)
-        lines = _toml_rows(content) if path.suffix == ".toml" else table_of(content)
-    except OSError as error:
-        raise BadScript(f"{path} cannot be read: {error.strerror}") from error
-    except Malformed as error:
-        raise BadScript(f"{path}: {error}") from error
-    if len(lines) > MOST_ROWS:
-        raise BadScript(f"{path} has {len(lines)} rows, more than {MOST_ROWS}")
+    lines = _lines(path)
     reader = _Reader(served(system, signs), outside_buffers(system, signs), tuple(faults))
     wrong = [f"{path}: {message}" for message in reader.check_columns(lines)]
     rows = []
@@ -154,6 +148,36 @@ def read_script(
     if wrong:
         raise BadScript("\n".join(wrong))
     return tuple(rows)
+
+
+def tested_by(path: Path) -> Iterator[tuple[int, str, tuple[str, ...]]]:
+    """Yield the rows of a script that say which requirements they test: number, text and names.
+
+    Raises:
+        BadScript: The file cannot be read.
+    """
+    for number, line in enumerate(_lines(path), 1):
+        if names := tuple(line.get(REQ, "").split()):
+            yield number, _shown(line), names
+
+
+def _lines(path: Path) -> list[dict[str, str]]:
+    try:
+        content = text(path, MIB)
+        lines = _toml_rows(content) if path.suffix == ".toml" else table_of(content)
+    except OSError as error:
+        raise BadScript(f"{path} cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise BadScript(f"{path}: {error}") from error
+    if len(lines) > MOST_ROWS:
+        raise BadScript(f"{path} has {len(lines)} rows, more than {MOST_ROWS}")
+    return lines
+
+
+def _shown(line: Mapping[str, str]) -> str:
+    """Return the text of a row, without what it tests."""
+    cells = ((name, cell) for name, cell in line.items() if name != REQ)
+    return " ".join(cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in cells)
 
 
 def _toml_rows(content: str) -> list[dict[str, str]]:
@@ -207,9 +231,6 @@ class _Reader:
 
     def row(self, number: int, line: Mapping[str, str]) -> OrderRow:
         """Read a row. Raises ValueError: the row has an error."""
-        shown = " ".join(
-            cell if name in (COMMAND, LEVEL) else f"{name}={cell}" for name, cell in line.items()
-        )
         level = self._level(line) if COMMAND in line else None
         order = () if level is None else _order(level, line)
         fields = set() if level is None else {field_of(leaf) for leaf in level.order_leaves}
@@ -224,7 +245,7 @@ class _Reader:
         cycles, within = (_whole(line, name) for name in (CYCLES, WITHIN))
         return OrderRow(
             number,
-            shown,
+            _shown(line),
             level,
             order,
             self._set(line),

@@ -29,7 +29,7 @@ from rcsc.lang.project import project_root, systems_above
 from rcsc.views.trace.kept import against, kept, names_of
 from rcsc.views.trace.matrix import REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
 from rcsc.views.trace.page import page
-from rcsc.views.trace.requirements import covered, findings, listed, refuted, standings
+from rcsc.views.trace.requirements import covered, findings, listed, of_scripts, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
 
 MOST_SHOWN = 10
@@ -183,10 +183,10 @@ def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
 
 
 def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
-    """Build the matrix of the C of a whole system, which is made of its description."""
+    """Build the matrix of the C of a whole system, which is made of its description, with what its scripts test."""
     generated = Generated(("c",), defensive=False, plans=plans)
     generated.add_system(path)
-    return of_system(generated.systems[path], str(path))
+    return replace(of_system(generated.systems[path], str(path)), declared=tuple(of_scripts(path)))
 
 
 # --- what is told ---

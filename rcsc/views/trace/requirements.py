@@ -3,8 +3,9 @@
 In: matrices, and perhaps a file with one name in each line. Out: places and standing by requirement, and findings.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.files.read import text
+from rcsc.run.description import description
+from rcsc.run.orders.script import BadScript, tested_by
 from rcsc.views.trace.matrix import REFUTED, Declared, Matrix, Tests, TracedLine
 
 
@@ -26,6 +29,8 @@ def listed(path: Path) -> tuple[str, ...]:
     return tuple(dict.fromkeys(line for line in lines if line and not line.startswith("#")))
 
 
+SCRIPT = "row of script"
+"""The sort of what tests a requirement by orders and their end."""
 MOST_PARTS = 6
 """Parts of a file that carry no requirement, named in a note."""
 
@@ -81,7 +86,31 @@ def _named(matrix: Matrix) -> Iterator[tuple[str, Standing]]:
         yield from ((name, here) for name in line.requirements)
     for one in matrix.declared:
         here = _standing(f"{one.sort} {one.name}", one.proof, [*_lines_of(matrix, one)])
+        if one.sort == SCRIPT:  # made of what the requirement says, and not of the tables
+            here = replace(here, tests=f"`{one.states}`, made by `rcsc run`")
         yield from ((name, here) for name in one.requirements)
+
+
+def of_scripts(system: Path) -> Iterator[Declared]:
+    """Yield the rows of a system's script, and of those in the folder `scripts` beside it, that name requirements.
+
+    Raises:
+        BadDescription: The system is not in order.
+        BadScript: Its script cannot be read.
+    """
+    named = description(system).script
+    others = sorted(path for end in ("csv", "toml") for path in (system.parent / "scripts").glob(f"*.{end}"))
+    for path in dict.fromkeys(path.resolve() for path in (*((named,) if named else ()), *others)):
+        here = system.parent / os.path.relpath(path, system.parent.resolve())
+        try:
+            rows = list(tested_by(path))
+        except BadScript:
+            if named is not None and path == named.resolve():
+                raise
+            continue  # it is something else
+        for number, shown, names in rows:
+            line = f":{number + 1}" if path.suffix == ".csv" else ""
+            yield Declared(SCRIPT, f"{path.name} {number}", f"{here}{line}", names, shown)
 
 
 def _lines_of(matrix: Matrix, one: Declared) -> Iterator[TracedLine]:
