@@ -46,6 +46,7 @@ TINY = {
     "rcsc prove tables/system.toml": "rcsc prove --level gripper tables/system.toml",
     "published/system.toml": "published/system.toml --trace 0 --steps 1",
     "--level task --without-deferral tables/system.toml": "--without-deferral --trace 0 tests/data/composed/system.toml",
+    "python -m tests.slips": "python -m tests.slips --help",
     "tests.differential --count 100000": "tests.differential --count 2",
     "--count 10000": "--count 1",
     "tests.claims --count 1000": "tests.claims --count 1",
@@ -109,7 +110,8 @@ def ends_with(command: str, monkeypatch: pytest.MonkeyPatch) -> int:
     assert words[:2] == ["python", "-m"], command
     with monkeypatch.context() as patch:
         patch.setattr(sys, "argv", words[2:])
-        patch.delitem(sys.modules, words[2], raising=False)  # another test may have imported it
+        for name in (words[2], f"{words[2]}.__main__"):  # another test may have imported it
+            patch.delitem(sys.modules, name, raising=False)
         try:
             runpy.run_module(words[2], run_name="__main__", alter_sys=True)
         except SystemExit as ended:
