@@ -683,10 +683,11 @@ class _Decision:
 
     def with_share(self, gap: Gap, search: Search) -> Gap:
         """Return a gap with the number of inputs that it has, and of how many that the assumptions allow, where these were counted."""
-        glance = (
-            self.options.brief and not self.options.bare
-        )  # a repair that is tried may leave no more inputs
-        if glance or smt.gives_up("how many inputs no line matches"):
+        what = "how many inputs no line matches"
+        if self.options.brief and not self.options.bare:  # a repair that is tried may leave no more inputs
+            smt.leave_open(what)
+            return gap
+        if smt.gives_up(what):
             return gap
         many = len(self.clauses) > _MOST_LINES_GROWN
         plain = must_cover(self.table) or many or self.plain
