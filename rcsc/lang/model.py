@@ -782,6 +782,10 @@ class Printed:
         """Return the position of a column after `||`, or of a condition, as changes of the text count them."""
         return column - (not self.named) + (0 if condition else self.conditions)
 
+    def alone(self, column: int) -> bool:
+        """Return whether the heading of a column after `||` is a condition by itself, after `when`."""
+        return self.said[column].startswith("when ")
+
 
 @dataclass(frozen=True, slots=True)
 class Table:

@@ -346,3 +346,25 @@ def test_a_variable_called_inmode_is_that_variable() -> None:
         f"{text}table t giving o {{\n| m || true | false |\n|---||---|---|\n{rows}\n}}\n"
     ).tables
     assert "inmode" in {str(name) for name in table.variables}
+
+
+WAS = """
+input x : int 0 .. 9
+state was_deep : int 0 .. 9
+output lamp : bool
+table t giving lamp {
+  | x      || true         | false        |
+  |--------||--------------|--------------|
+  | 0 .. 5 || was_deep < 3 | was_deep > 6 |
+  | > 5    || true         | false        |
+}
+"""
+
+
+def test_a_help_says_a_state_as_it_is_called() -> None:
+    """Though its name begins as those of the states that hold the values of the cycle before."""
+    [help_] = [each for finding in reported(WAS) if finding.code.value == "RCS401" for each in finding.help]
+    assert help_.startswith(
+        "`was_deep in 3 .. 6` in row `0_to_5` under `lamp`, or another result, closes the gap"
+    )
+    assert help_.endswith(": proved")

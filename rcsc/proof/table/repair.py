@@ -224,11 +224,8 @@ class Partings:
         universe, lines, _ = self._across
         for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
             own, theirs = table.lines[line], table.lines[other]
-            if (
-                table.turned
-                and table.turned.by
-                and not table.turned.said[table.turned.places[line][1]].startswith("when ")
-            ):
+            printed = table.turned
+            if printed and printed.by and not printed.alone(printed.places[line][1]):
                 continue  # its column has no such condition
             pairs = zip(table.columns, own.tests, theirs.tests, strict=True)
             terms = [
@@ -276,8 +273,8 @@ class Partings:
 def _is_printed(cell: PartingCell, table: Table, printed: Printed) -> bool:
     """Return whether the condition that changes stands in the row, or in the heading of the line's column, and so is written once."""
     _, column = printed.places[cell.line]
-    whole = printed.said[column].startswith("when ")
-    return cell.column < printed.conditions or whole == (table.columns[cell.column].subject is None)
+    subject = table.columns[cell.column].subject
+    return cell.column < printed.conditions or printed.alone(column) == (subject is None)
 
 
 _JOINED = re.compile(r"\b(or|xor|implies|when|for)\b", re.ASCII)

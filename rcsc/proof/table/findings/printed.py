@@ -214,14 +214,15 @@ class _Filling:
         """Return the columns by what a matrix is by, with their tests, without those that overlap an earlier one."""
         found: dict[int, Test | None] = {}
         boxes = list[Box]()
-        for column, said in enumerate(self.printed.said):
-            test = None if said.startswith("when ") else self.test(column)
-            if said.startswith("when ") or (
-                test is not None and any(meet(test.box or (), box) for box in boxes)
-            ):
+        for column in range(len(self.printed.columns)):
+            if self.printed.alone(column):
+                continue
+            test = self.test(column)
+            box = () if test is None else test.box or ()
+            if any(meet(box, other) for other in boxes):
                 continue
             found[column] = test
-            boxes += [] if test is None or test.box is None else [test.box]
+            boxes.append(box)
         return found
 
     def test(self, column: int) -> Test | None:
@@ -259,8 +260,8 @@ class _Filling:
             if kind is None or text is None:
                 return ""
             if row.get(name) != box and text:
-                before = name.removeprefix("was_")
-                said.append(cells.condition(name if name == before else f"was {before}", kind, box))
+                before = self.program.variable(name).previous_of
+                said.append(cells.condition(name if before is None else f"was {before}", kind, box))
         return " and ".join(said)
 
 
