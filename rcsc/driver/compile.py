@@ -10,7 +10,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host import children
-from rcsc.base.host.tools import c_compiler, ending, run_command, write_c
+from rcsc.base.host.tools import Absent, c_compiler, ending, run_command, write_c
 from rcsc.code.emit import TARGETS, emitted
 from rcsc.code.emit.generated import lies_in, lying, stale, write
 from rcsc.code.emit.lower import lower
@@ -79,13 +79,14 @@ def _unusable(files: Mapping[str, str]) -> Iterator[Diagnostic]:
             message = f"the generated `{path}` cannot be imported: {wrong}"
             yield Diagnostic(Code.INTERNAL, message, Label(Span(path, 0, 0)))
     compiler = c_compiler()
+    if isinstance(compiler, Absent) or not any(path.endswith(".c") for path in files):
+        return
     with children.scratch("compile") as place:
         sources = write_c(files, place)
-        if sources and isinstance(compiler, str):
-            ran = run_command([compiler, "-std=c99", "-fsyntax-only", "-w", *sources], place, COMPILE_S)
-            if ran.status != 0:
-                message = f"the generated C does not compile: {ending(ran, COMPILE_S)}"
-                yield Diagnostic(Code.NO_C_COMPILER, message, Label(Span(sources[0], 0, 0)))
+        ran = run_command([compiler, "-std=c99", "-fsyntax-only", "-w", *sources], place, COMPILE_S)
+    if ran.status != 0:
+        message = f"the generated C does not compile: {ending(ran, COMPILE_S)}"
+        yield Diagnostic(Code.NO_C_COMPILER, message, Label(Span(sources[0], 0, 0)))
 
 
 def compile_system(path: Path, *, only_check: bool = False) -> Conclusion:
