@@ -229,7 +229,7 @@ class Generated:
         systems: By the path of the description.
     """
 
-    targets: Collection[str]
+    targets: tuple[str, ...]
     defensive: bool
     files: dict[str, str] = field(default_factory=dict)
     clashes: list[Diagnostic] = field(default_factory=list)
@@ -304,7 +304,9 @@ def generated_of(
     Raises:
         BadDescription: A system does not fit its programs.
     """
-    found = Generated(targets, defensive)
+    found = Generated(
+        tuple(targets), defensive
+    )  # a trial apart is handed it, and takes no view of a table of functions
     for root, program in project.executable:
         found.add_program(root, program)
     for path in systems:

@@ -34,6 +34,14 @@ level l {
   table t
 }
 """
+SYSTEM = """name = "whole"
+generated = "generated"
+tick_ms = 40
+[[level]]
+name = "l"
+program = "a"
+[buffers]
+"""
 Edit = Callable[[Path], None]
 
 
@@ -116,6 +124,19 @@ def test_an_edit_elsewhere_is_not_looked_at(project: Path, capsys: pytest.Captur
     assert status == 1
     assert "the C executor's" in text
     assert "tested: other/python and other/c" in text
+
+
+def test_an_edit_under_a_system_is_found(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The trials of the whole are handed over to a process of their own, too."""
+    (project / "rcsc.toml").write_text("")
+    (project / "system.toml").write_text(SYSTEM)
+    assert run(["compile", "-q", "--out", "generated", "."]) == 0
+    edit_file(project / "generated/c/a.c", ("(int32_t)s->left - 1", "1 / (s->left - s->left)"))
+    capsys.readouterr()
+    assert run(["test", "--examples", "1", "--mutants", "0", "--no-cortex", "."]) == 1
+    text = "".join(capsys.readouterr())
+    assert set(re.findall(r"error\[(\w+)\]", text)) == {"RCS501", "RCS601"}
+    assert "system whole: 1 episodes without a plant" in text
 
 
 @pytest.mark.usefixtures("project")
