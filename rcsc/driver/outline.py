@@ -133,7 +133,10 @@ def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
             ts.level.span.start,
             ts.level.span.end,
             tuple(map(_table, map(ts.table, ts.level.table_names))),
-            tuple((each.name, os.path.realpath(each.span.file)) for each in ts.program.properties),
+            tuple(
+                ((each.word, "", each.name), os.path.realpath(each.span.file))
+                for each in ts.program.properties
+            ),
         )
         for name, ts in systems.items()
     )

@@ -29,7 +29,6 @@ from rcsc.compose.contract.claims import UNREACHED, Promise
 from rcsc.compose.proof.standing import (
     ASSUMPTION,
     ONE_LINE,
-    PROPERTY,
     SOME_LINE,
     KnownSystem,
     KnownVerdict,
@@ -210,9 +209,9 @@ class _Seen:
         """Return the finding with a note where its properties are proved, if each is in every level that states it."""
         file = os.path.realpath(diagnostic.primary.span.file)
         stated = [
-            (system, known_system, level.name, (PROPERTY, "", name))
+            (system, known_system, level.name, key)
             for (system, _), (known_system, level) in self.levels.items()
-            for name, at in level.properties
+            for key, at in level.properties
             if at == file
         ]
         state = _worst({known_system.of_obligation(level, key) for _, known_system, level, key in stated})

@@ -21,11 +21,11 @@ from rcsc.compose.contract.claims import (
     UNREACHED,
     Key,
     spelled,
+    trust_of,
 )
 from rcsc.compose.contract.environment import Above, Below
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.contract.trusts import trust_of
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof

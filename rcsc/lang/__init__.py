@@ -30,7 +30,7 @@ Modules, in the order the data flows: `operator_table` (each operator: its word,
 `syntax` (text to tree), `project` (which files belong together), `expressions`
 and `resolve` (tree to `model`); of a model: `leaves` (what is read and written), `interpret`, `interval_sets`
 (boxes), `meaning` and `digest` (names and digests of what a proof depends on), `questions` (a region's question as
-conditions), `reserved` (words of C and Python), `restart` (what a level adopts that starts anew), `hidden`
-(states that the compiler adds, of two programs). Between `expressions`
+conditions), `over_time` (requirements over time as monitors), `reserved` (words of C and Python), `restart` (what a level adopts that
+starts anew), `hidden` (states that the compiler adds, of two programs). Between `expressions`
 and `resolve` stands `protocol` (what a program gets that declares whom it serves and commands).
 """

@@ -183,8 +183,9 @@ def every_statement(program: Program) -> Iterator[Statement]:
 
 def every_expression(program: Program) -> Iterator[Expr]:
     """Yield the expressions that a program tests, states and calculates."""
-    for stated in (program.assumptions, program.invariants, program.properties):
+    for stated in (program.assumptions, program.invariants):
         yield from (each.condition for each in stated)
+    yield from (condition for each in program.properties for condition in each.about)
     for table in program.tables:
         yield from (test.condition for test in table.distinct_tests)
     for statement in every_statement(program):
@@ -267,13 +268,13 @@ class Uses:
                 self._reads(name, "", variable.deferred_until, ())
                 self._note(self.read, name, "", next_, ())
                 self._note(self.written, name, "", (variable.name,), ())
-        for sort, claims in (
-            ("assumption", program.assumptions),
-            ("invariant", program.invariants),
-            ("property", program.properties),
-        ):
-            for claim in claims:
-                self._reads(f"{sort} {claim.name}", "", claim.condition, claim.requirements)
+        for assumed in program.assumptions:
+            self._reads(f"assumption {assumed.name}", "", assumed.condition, assumed.requirements)
+        for invariant in program.invariants:
+            self._reads(f"invariant {invariant.name}", "", invariant.condition, invariant.requirements)
+        for stated in program.properties:
+            for condition in stated.about:
+                self._reads(f"{stated.word} {stated.name}", "", condition, stated.requirements)
 
     def _procedure(self, procedure: Procedure) -> None:
         """Note what a procedure itself reads and writes; of an `extern` one, what it is declared to."""

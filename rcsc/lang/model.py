@@ -626,6 +626,7 @@ class Property:
             gives, leaves as the cycle before left them (before the first: as the level begins).
         text: As it was written, after the colon.
         standard: Whether it comes with the protocol, and nobody wrote it.
+        monitor: Of a requirement over time, the states that its condition reads.
     """
 
     name: str
@@ -635,6 +636,51 @@ class Property:
     span: Span = at()
     standard: bool = field(default=False, compare=False)
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    monitor: "Monitor | None" = None
+
+    @property
+    def word(self) -> str:
+        """What its declaration calls it."""
+        return "property" if self.monitor is None else "requirement"
+
+    @property
+    def about(self) -> tuple[Expr, ...]:
+        """What it says of the level's own leaves: its condition, or what its monitor looks at."""
+        return (self.condition,) if self.monitor is None else tuple(truth for _, truth in self.monitor.truths)
+
+
+WATCHED = "watched "
+"""Prefix of the states of monitors, which the level does not have; no leaf's name has a space."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """A state of a monitor: its name, type, and value before the first cycle and after a restart."""
+
+    name: VariableName
+    type: Scalar
+    initial: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """What is watched of a requirement over time, a cycle at a time (`rcsc.lang.over_time`).
+
+    After each cycle every truth is stored in its state, in order, then the statements run. They read the monitor's states as the cycle
+    finds them under the names that `earlier` gives. The requirement's `condition` is then true, unless the cycle breaks it.
+
+    Attributes:
+        states: All of its states.
+        defined: The state that says whether all truths of the cycle are defined; one that is not is stored as false.
+        truths: Conditions on the level's leaves, as in a property; each with the state that takes its truth.
+        owes: The condition that what was asked for so far is still to come: it is then broken if no other cycle follows.
+    """
+
+    states: tuple[Hidden, ...]
+    defined: VariableName
+    truths: tuple[tuple[VariableName, Expr], ...]
+    statements: tuple[Statement, ...]
+    owes: Expr
 
 
 # --- tables --------------------------------------------------------------------------

@@ -133,6 +133,16 @@ property q : a until b
 property s : a for 3 [s] upon d
 property n : a not in low
 assume k proved : false
+requirement u : only while a, whenever b, exactly after 3 cycles, c
+requirement w : only before a, eventually b
+requirement x : only after a, at once b
+requirement y : between a and b, at last c
+requirement z : from a until b, next c
+requirement aa : unless a, for 3 cycles, c
+requirement ab : while a, always b
+requirement ac : before a, never b
+requirement ad : after a, when b, within 3 [s], c
+requirement ae : until a, b
 procedure f(x : int 0 .. 3) { local y : bool := max(1, 2) = 2 if a { b := 1 }
 else { for i in 0 .. 3 { next c := d } } case a { 1 { b := 2 } } }
 module g reads a writes b { b := count(a) }
@@ -171,6 +181,7 @@ def test_every_word_of_the_grammar_is_coloured_somewhere() -> None:
         for piece in pieces(line, COLOURS["patterns"])
         if piece.scope.startswith(WORDS)
     }
+    coloured |= {word for one in coloured for word in one.split()}
     assert words - coloured == set()
     marks = {mark for mark in listed if not mark.isalnum()} - {'"'}
     joined = {

@@ -21,8 +21,9 @@ from rcsc.compose.contract.claims import (
 from rcsc.compose.contract.claims import RESTING as RESTS
 from rcsc.compose.contract.environment import Above, _admits, links
 from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
-from rcsc.compose.contract.properties import _opened, every_predicate, properties
+from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
+from rcsc.compose.contract.watched import opened
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.proof import assume_guarantee
 from rcsc.compose.proof import system as system_proof
@@ -464,7 +465,7 @@ def test_each_part_of_a_property_that_reads_a_refused_input_is_true_or_false() -
         "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
     )
     [stated] = ts.program.properties
-    node = _opened(stated.condition, frozenset({"a"}), ts.havoc())
+    node, _ = opened(stated.condition, frozenset({"a"}), ts.havoc())
     assert set(values.variables([node])) == {f"{REFUSED}: (< a int:3)", f"{REFUSED}: (> n a)", "n"}
 
 

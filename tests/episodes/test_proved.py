@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.compose.contract.claims import Trust, trust_of
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.contract.trusts import Trust, trust_of
 from rcsc.front.commands import run as rcsc
 from rcsc.run.campaign.summary import watched, watched_text
 from rcsc.run.episodes.episode import BufferFault, Episode, OrderSpec, Reading, Restart

@@ -196,10 +196,10 @@ def test_a_refused_input_stands_outside_its_range_for_what_looks_at_it() -> None
     ts = TransitionSystem(program, level, Links(level.name, None, (), (), ("x", "y")))
     assert REFUSED in ts.kinds
     made = ts.refusing().cycle(ts.havoc())
-    holds = dict(properties(program, made))
+    holds = {stated.name: node for stated, node in properties(program, made)}
     assert holds["ranged"] is not values.TRUE
     assert holds["back"] is not values.TRUE
-    plain = dict(properties(program, ts.cycle(ts.havoc())))
+    plain = {stated.name: node for stated, node in properties(program, ts.cycle(ts.havoc()))}
     assert plain["ranged"] is values.TRUE
     assert plain["back"] is values.TRUE
 

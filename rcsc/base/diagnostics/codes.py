@@ -1030,6 +1030,21 @@ class Code(StrEnum):
         }
         level gripper { period 40 [ms] table close }
     """
+    NO_BOUND = """RCS323: a requirement that no cycle breaks
+
+    What may always still come is broken by no cycle, only by a run that never ends. `eventually` and `at last` say so in a scope that
+    need not end, and `always` and `never` in an `only` scope, which ask for the opposite outside. Say until when.
+
+        input asked : bool
+        output given : bool
+        requirement answered : when asked, eventually given
+
+    error: no cycle is too late for `eventually`: what it asks for may always still come
+
+        input asked : bool
+        output given : bool
+        requirement answered : when asked, within 3 cycles, given
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

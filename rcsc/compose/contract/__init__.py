@@ -12,15 +12,15 @@ numbered fields of the order are the same, too, by the contract; obligation `ONC
 level raises the flag only where the command differs from the last one, the obligation follows from the contract. If it raises the flag
 whenever the command is `go`, a state with `go` and without the flag breaks it, unless an invariant excludes that state.
 
-Trusted: `environment`, `facts`, `transition`, `properties`, `obligations`, `claims`. Not trusted: `predicates` and `walk` only guide the
-search, `given` and `variants` only make runs.
+Trusted: `environment`, `facts`, `watched`, `transition`, `properties`, `obligations`, `claims`. Not trusted: `predicates` and `walk` only
+guide the search, `given` and `variants` only make runs.
 
 Cost: a cycle is built by one pass over the level's statements; nodes are shared, and nothing is enumerated. There are a few obligations
 for each table, order, deferred state and statement of the program; pairs of lines come only into runs.
 
 Modules, in the order the data flows: `environment` (which buffers link which levels), `facts` (what is declared of
-them), `transition` (a cycle as nodes), `given` and `walk`
-(extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`,
-`trusts` (what claims take for granted);
+them), `watched` (monitors of requirements beside a cycle), `transition` (a cycle as nodes), `given` and `walk`
+(extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`
+(with what they take for granted);
 `variants` are programs under other rules, `beginning` other values to search runs from.
 """

@@ -11,9 +11,10 @@ Example: `p` rests on `safe`, `safe` on invariant `i`, and `i` on `safe`. If all
 `i`, none is, and `p` lacks `i`.
 """
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import Enum, StrEnum
 from typing import TypeAlias
 
 Key: TypeAlias = tuple[str, str, str]
@@ -200,3 +201,46 @@ def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> s
     where = [f"level `{owner}`" if owner != level else "", f"table `{table}`" if table else ""]
     gone = ", not looked at" if claims is not None and need not in claims and need[1] not in phrases else ""
     return ": ".join([part for part in where if part] + [words]) + gone
+
+
+# --- trusts ----------------------------------------------------------------------------------
+
+
+class Trust(Enum):
+    """A kind of trust, with the sentence that `rcsc prove` prints of it; LEVEL, NAME, INPUTS and ARE stand for whom and what it is about.
+
+    No level is responsible for what claims trust. One table, so that what watches a claim can tell when its trust is broken.
+    """
+
+    DECLARED = "assumption `NAME` of level `LEVEL`, as it is declared"
+    STATES = "level `LEVEL` can be as its tables declare in every state that it comes to"
+    DATABASE = "the same question has the same answer in `NAME` of level `LEVEL`"
+    PROTOCOL = "`LEVEL` keeps to the protocol"
+    REFUSED = "INPUTS of level `LEVEL` ARE never refused"
+    CLAMPED = "INPUTS of level `LEVEL` ARE in range where it begins anew"
+    NOT_FOR_EVER = "INPUTS of level `LEVEL` ARE not refused for ever"
+    RESTS = "`LEVEL` comes to rest some time where it is told to, and stays so"
+    ANSWERS = "`LEVEL` answers every order that is not replaced, and stays so"
+    STILL = "the values in `NAME` of level `LEVEL` stand still meanwhile"
+    EXTERNS_FINITE = "extern procedures of level `LEVEL` are not refused for ever"
+
+
+_PLACES = {
+    "LEVEL": "(?P<level>[^`]+)",
+    "NAME": "(?P<name>[^`]+)",
+    "INPUTS": "`[^`]+`(?:, `[^`]+`)*",
+    "ARE": "(?:is|are)",
+}
+_PATTERNS = {
+    trust: re.compile(re.sub("|".join(_PLACES), lambda found: _PLACES[found[0]], re.escape(trust.value)))
+    for trust in Trust
+}
+
+
+def trust_of(words: str) -> tuple[str, str, str]:
+    """Return a trust's kind, its level or neighbour, and its name; empty where it has none, all empty for a sentence of no kind."""
+    for trust, pattern in _PATTERNS.items():
+        if (found := pattern.fullmatch(words)) is not None:
+            parts = found.groupdict()
+            return trust.name, parts.get("level") or "", parts.get("name") or ""
+    return "", "", ""

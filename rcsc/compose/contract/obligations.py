@@ -52,6 +52,7 @@ class Sort(StrEnum):
     OWED = "its outputs are as other levels assume"
     INVARIANT = "invariant"
     PROPERTY = "property"
+    REQUIREMENT = "requirement"  # over time: a condition on a cycle and the ghosts of its monitor
     ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
     SAFE = SAFE[0]
@@ -71,6 +72,7 @@ BROKEN = {
     Sort.OWED: "its outputs are not as `{}` says",
     Sort.INVARIANT: "invariant `{}` does not hold",
     Sort.PROPERTY: "property `{}` is broken",
+    Sort.REQUIREMENT: "requirement `{}` is broken",
     Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
     Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
@@ -127,7 +129,7 @@ class Obligation:
     @property
     def shown(self) -> str:
         """Its text in one line, without the table."""
-        if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY}:
+        if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT}:
             return f"{self.sort.value} `{self.name}`"
         if self.lines:
             return "lines {} do not both match".format(" and ".join(f"`{line}`" for line in self.lines))
@@ -403,8 +405,8 @@ def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """State the invariants and properties of the program, and the facts that it owes other levels."""
     for name, holds in invariants(ts.program, cycle):
         yield Obligation(Sort.INVARIANT, "", name, holds)
-    for name, holds in properties(ts.program, cycle):
-        yield Obligation(Sort.PROPERTY, "", name, holds)
+    for stated, holds in properties(ts.program, cycle):
+        yield Obligation(Sort(stated.word), "", stated.name, holds)
     for name, holds in owed(ts.links, cycle):
         yield Obligation(Sort.OWED, "", name, holds)
     if ts.safety.within:

@@ -10,7 +10,6 @@ condition (a division by zero, an index out of range) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import replace
 
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.predicates import (
@@ -21,9 +20,10 @@ from rcsc.compose.contract.predicates import (
     looked_back_at,
     predicates,
 )
-from rcsc.compose.contract.transition import REFUSED, Cycle, Leaves, TransitionSystem
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.watched import judged, monitors, true
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.lang.leaves import parts, read_by, renamed
+from rcsc.lang.leaves import everything, expressions, parts, read_by, renamed
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     BEFORE,
@@ -33,10 +33,13 @@ from rcsc.lang.model import (
     Bool,
     Enum,
     Expr,
+    Int,
     Kind,
     Literal,
+    Monitor,
     Op,
     Program,
+    Property,
     Read,
     Scalar,
     Value,
@@ -44,8 +47,10 @@ from rcsc.lang.model import (
     earlier,
 )
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.execution import Run
-from rcsc.proof.symbolic.values import FALSE, Node
+from rcsc.proof.symbolic.values import Node
+
+MOST_COUNTED = 12
+"""How far the counters of monitors are, as predicates: each number of cycles up to so many, and those that the statements compare."""
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
@@ -55,89 +60,32 @@ def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
     for invariant in program.invariants:
         yield (
             invariant.name,
-            values.both(_true(invariant.condition, cycle.before), _true(invariant.condition, cycle.after)),
+            values.both(true(invariant.condition, cycle.before), true(invariant.condition, cycle.after)),
         )
 
 
 def owed(links: Links, cycle: Cycle) -> Iterator[tuple[str, Node]]:
     """Yield each owed fact's name, and its condition before and after the cycle: it may be read as it stood before, too."""
     for fact in links.owes:
-        yield fact.name, values.both(_true(fact.condition, cycle.before), _true(fact.condition, cycle.after))
+        yield fact.name, values.both(true(fact.condition, cycle.before), true(fact.condition, cycle.after))
 
 
 def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
     """Return the condition that the invariants hold within the cycle, too, where operations are safe only under them."""
     return values.all_of(
-        _true(invariant.condition, leaves)
+        true(invariant.condition, leaves)
         for invariant in program.invariants
         if invariant.name in names
         for leaves in (cycle.settled, *cycle.seen, cycle.middle, cycle.acted)
     )
 
 
-def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """Yield each property's name and its condition on the cycle and the one before."""
+def properties(program: Program, cycle: Cycle) -> Iterator[tuple[Property, Node]]:
+    """Yield each property and requirement over time, and its condition on the cycle and the one before."""
     leaves = {**cycle.after, **{str(earlier(name)): node for name, node in cycle.before.items()}}
+    inputs = [str(v.name) for v in program.variables if v.kind is Kind.INPUT]
     for stated in program.properties:
-        holds = _true(stated.condition, leaves)
-        if cycle.untaken is not FALSE:
-            holds = _with_refusals(program, cycle, stated.condition, leaves, holds)
-        elif cycle.strange and REFUSED in cycle.before:  # at a restart nothing is clamped yet
-            clamped = frozenset(str(earlier(name)) for name in cycle.strange)
-            holds = values.choice(cycle.before[REFUSED], _opened(stated.condition, clamped, leaves), holds)
-        yield stated.name, holds
-
-
-def _with_refusals(program: Program, cycle: Cycle, condition: Expr, leaves: Leaves, holds: Node) -> Node:
-    """Return the condition that a property holds of the cycle, also where it or the one before took nothing.
-
-    The inputs of such a cycle stand as they came (`Event.INPUT_REFUSED`). One from outside need not be in its range: whatever compares it
-    then may be true or false. The cycle after it may find any inputs in the one before.
-    """
-    came = {**leaves, **cycle.taken}
-    looks_back = frozenset(str(earlier(str(v.name))) for v in program.variables if v.kind is Kind.INPUT)
-    before = cycle.before.get(REFUSED, FALSE)
-    untaken = values.choice(
-        before,
-        _opened(condition, cycle.strange | looks_back, came),
-        _opened(condition, cycle.strange, came),
-    )
-    after_one = values.choice(before, _opened(condition, looks_back, leaves), holds)
-    return values.choice(cycle.untaken, untaken, after_one)
-
-
-def _opened(condition: Expr, names: frozenset[str], leaves: Leaves) -> Node:
-    """Return the condition, with each atomic part that reads one of the leaves true or false; false if one may be undefined."""
-    opened: dict[str, Node] = {}
-    undefined = False
-
-    def part(expr: Expr) -> Expr:
-        nonlocal undefined
-        if not names & set(map(str, read_by(expr))):
-            return expr
-        if isinstance(expr, Apply) and all(isinstance(one.type, Bool) for one in (expr, *expr.args)):
-            return replace(expr, args=tuple(map(part, expr.args)))
-        undefined = undefined or not all(map(_only_compares, parts(expr)))
-        name = f"{REFUSED}: {spelled(expr)}"
-        opened[name] = values.variable(name, Bool())
-        return Read(VariableName(name), Bool())
-
-    open_ = part(condition)
-    return FALSE if undefined else _true(open_, {**leaves, **opened})
-
-
-def _only_compares(part: Expr) -> bool:
-    """Return whether a part of an atomic condition is defined for any value whatever, in its range or not."""
-    return isinstance(part, Read | Literal | Among) or (isinstance(part, Apply) and part.op in COMPARISONS)
-
-
-def _true(condition: Expr, leaves: Leaves) -> Node:
-    """Return the condition that an expression is defined and true."""
-    run = Run({}, {}, dict(leaves))
-    truth = run.evaluate(condition)
-    return values.all_of(
-        (*(values.follows(obligation.path, obligation.good) for obligation in run.obligations), truth)
-    )
+        yield stated, values.both(*judged(stated.condition, leaves, cycle.refusals(inputs)))
 
 
 # --- of a run --------------------------------------------------------------------------------
@@ -176,7 +124,7 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
     except UNDEFINED:
         return False
     leaves = {str(name): values.constant(kinds[name], state[name]) for name in read_by(condition)}
-    return bool(_true(condition, leaves).low)
+    return bool(true(condition, leaves).low)
 
 
 # --- as predicates -----------------------------------------------------------------------------
@@ -211,8 +159,21 @@ def _stated_conditions(ts: TransitionSystem) -> list[Expr]:
     return [
         *(invariant.condition for invariant in program.invariants),
         *(stated.condition for stated in program.properties),
+        *(condition for _, monitor in monitors(program) for condition in _looked_at(monitor)),
         *(fact.condition for fact in ts.links.owes),
     ]
+
+
+def _looked_at(monitor: Monitor) -> Iterator[Expr]:
+    """Yield what a monitor looks at of the level, what its statements decide, and how far its counters are."""
+    yield from (truth for _, truth in monitor.truths)
+    for statement in everything(monitor.statements):
+        yield from expressions(statement)
+    for state in monitor.states:
+        if isinstance(state.type, Int):
+            for cycles in range(1, min(state.type.high, MOST_COUNTED) + 1):
+                number = Literal(cycles, Int(cycles, cycles))
+                yield Apply(Op.GE, (Read(state.name, state.type), number), Bool())
 
 
 def _stated_predicates(

@@ -10,6 +10,10 @@ from functools import partial
 
 from rcsc.compose.contract.environment import Below, Links
 from rcsc.compose.contract.facts import believed, outside_values
+from rcsc.compose.contract.watched import GHOST as GHOST  # noqa: PLC0414  # of a cycle's ghosts, too
+from rcsc.compose.contract.watched import REFUSED as REFUSED  # noqa: PLC0414  # as above
+from rcsc.compose.contract.watched import Leaves as Leaves  # noqa: PLC0414  # as above
+from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, monitors
 from rcsc.lang.interpret import chosen_table
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (  # fmt: skip
@@ -42,13 +46,8 @@ from rcsc.proof.symbolic.evaluation import ExternResults, State
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 
-GHOST = "asked "
-"""Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""
-REFUSED = f"{GHOST}and an input was refused"
-"""The ghost of properties that look back at inputs: before the cycle these stand as they came, admitted by none."""
 _REFUSED = "an input is refused:"
 """Of a cycle: whether the environment ends it by an input. Its variables are no leaves: a leaf has no colon."""
-Leaves = dict[str, Node]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +159,12 @@ class Cycle:
         """The condition that a matched table runs one line or DEFAULT: the cycle ends in no fault that the proofs exclude."""
         return values.all_of(values.follows(at.runs, at.one_line) for at in self.every)
 
+    def refusals(self, inputs: Iterable[str], suffix: str = "") -> Refusals:
+        """Return what is known of inputs that stand as they came, in this cycle or the one before."""
+        looks_back = frozenset(str(earlier(name)) for name in inputs)
+        before = self.before.get(REFUSED, FALSE)
+        return Refusals(self.untaken, self.strange, before, looks_back, self.taken, suffix)
+
 
 def _matches(run: Run, line: Line) -> Node:
     return values.all_of(map(run.evaluate, line.conditions))
@@ -216,6 +221,8 @@ class TransitionSystem:
         looked_at = self._looked_back_at()
         if looked_at:
             self.kinds[REFUSED] = Bool()
+        for _, monitor in monitors(self.program):
+            self.kinds |= {str(state.name): state.type for state in monitor.states}
         outside = list(self._of_outside())
         self.refusable = tuple(str(v.name) for v in outside if refusable(v))
         past = (v for v in outside if v.admit is Admit.CLAMP and unadmitted(v))
@@ -224,7 +231,8 @@ class TransitionSystem:
 
     def _looked_back_at(self) -> frozenset[str]:
         """Find the inputs that a property looks back at, which a refused cycle left as they came."""
-        read = {str(name) for stated in self.program.properties for name in read_by(stated.condition)}
+        every = (condition for stated in self.program.properties for condition in stated.about)
+        read = {str(name) for condition in every for name in read_by(condition)}
         return frozenset(leaf for leaf in self.inputs if str(earlier(leaf)) in read)
 
     def _of_outside(self) -> Iterator[Variable]:
@@ -320,6 +328,7 @@ class TransitionSystem:
         start = {str(v.name): values.constant(v.type, v.initial) for v in self.program.variables}
         return {
             **{name: values.constant(kind, 0) for name, kind in self.kinds.items() if name.startswith(GHOST)},
+            **first_ghosts(self.program),
             **start,
         }
 
@@ -383,9 +392,10 @@ class TransitionSystem:
         is owed, too.
         """
         cycle = self._admitted(before, suffix, taken, anew=anew)
-        if not (self.refuses and self.refusable):
-            return cycle
-        return self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
+        if self.refuses and self.refusable:
+            cycle = self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
+        watched = ghosts_after(self.program, before, cycle.after, cycle.refusals(self.inputs, suffix))
+        return replace(cycle, after={**cycle.after, **watched}) if watched else cycle
 
     def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:
         """Return the cycle with the case that an input is refused: then it takes nothing (`Event.INPUT_REFUSED`).

@@ -11,6 +11,7 @@ from random import Random
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.given import at_random
 from rcsc.compose.contract.transition import EARLY, GHOST, TransitionSystem
+from rcsc.compose.contract.watched import begin, step
 from rcsc.lang.interpret import UNDEFINED, Fault, cycle, initial
 from rcsc.lang.model import Enum, Value, key_bounds, value_of_key
 from rcsc.lang.restart import NUMBERS
@@ -22,7 +23,7 @@ class Walk:
 
     Attributes:
         now: The value of every leaf.
-        ghosts: The last questions to the database, as in `transition`.
+        ghosts: The last questions to the database, as in `transition`; `watched`, the states of monitors.
         ran: The tables and lines that ran.
     """
 
@@ -30,21 +31,25 @@ class Walk:
     random: Random
     now: dict[str, Value] = field(init=False)
     ghosts: dict[str, Value] = field(init=False)
+    watched: dict[str, Value] = field(init=False)
     ran: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.now = dict(initial(self.ts.program))
         kinds = self.ts.kinds
         self.ghosts = {name: value_of_key(kinds[name], 0) for name in kinds if name.startswith(GHOST)}
+        self.watched = begin(self.ts.program)
 
     def begin_at(self, state: Mapping[str, Value]) -> None:
         """Continue from a state that a walk has reached."""
         self.now = {leaf: state[leaf] for leaf in self.now}
         self.ghosts = {leaf: state[leaf] for leaf in self.ghosts}
+        self.watched = {leaf: state[leaf] for leaf in self.watched}
 
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
         """Yield the state after each cycle; stop at a fault, which the proof has to find."""
         for _ in range(cycles):
+            before = dict(self.now)
             self._take()
             try:
                 with at_random(self.ts.program, self.random):
@@ -54,10 +59,11 @@ class Walk:
             if outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot
+            self.watched = step(self.ts.program, self.watched, before, self.now)
             self.ran.update(self.ts.lines_before(self.now))
             if outcome.line is not None:
                 self.ran.add((self.ts.table_of(self.now), str(outcome.line)))
-            yield {**self.now, **self.ghosts}
+            yield {**self.now, **self.ghosts, **self.watched}
 
     def _any(self, leaf: str) -> Value:
         """Draw a value; from a wide range one of a few, so that equal values are common."""

@@ -12,7 +12,8 @@ from typing import TypeAlias, assert_never
 from rcsc.compose.contract.given import ExternAnswer, scripted
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.properties import invariant_kept, property_kept
-from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, TransitionSystem
+from rcsc.compose.contract.transition import EARLY, Cycle, Leaves, TransitionSystem
+from rcsc.compose.contract.watched import begin, is_ghost, step
 from rcsc.lang.interpret import (
     ExternError,
     Fault,
@@ -56,6 +57,7 @@ class CycleRun:
         answers: The results of each call of an extern procedure, in order.
         stages: The tables that ran before it in the cycle.
         anew: Whether it is the first after a restart.
+        found: The states of the monitors of requirements at its start, and `left` at its end: no leaves, and nobody's to read.
     """
 
     taken: Mapping[str, Value]
@@ -69,6 +71,8 @@ class CycleRun:
     answers: tuple[ExternAnswer, ...] = ()
     stages: tuple["StageRun", ...] = ()
     anew: bool = False
+    found: Mapping[str, Value] = field(default_factory=dict, repr=False)
+    left: Mapping[str, Value] = field(default_factory=dict, repr=False)
 
     @property
     def ends_the_run(self) -> bool:
@@ -81,12 +85,17 @@ Given: TypeAlias = tuple[Mapping[str, Value], tuple[ExternAnswer, ...]]
 
 
 def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[CycleRun, ...]:
-    """Run cycles from `start` on inputs and results of extern procedures, up to the first fault that ends a run."""
-    now = dict(start)
+    """Run cycles from `start` on inputs and results of extern procedures, up to the first fault that ends a run.
+
+    Monitors of requirements begin there, or have the states that stand in `start`.
+    """
+    begun = begin(ts.program)
+    found = {name: start.get(name, value) for name, value in begun.items()}
+    now = {name: value for name, value in start.items() if name not in begun}
     steps: list[CycleRun] = []
     for taken, answers in given:
-        steps.append(one_cycle(ts, now, taken, answers))
-        now = dict(steps[-1].after)
+        steps.append(one_cycle(ts, now, taken, answers, found))
+        now, found = dict(steps[-1].after), dict(steps[-1].left)
         if steps[-1].ends_the_run:
             break
     return tuple(steps)
@@ -97,11 +106,14 @@ def one_cycle(
     before: Mapping[str, Value],
     taken: Mapping[str, Value],
     answers: tuple[ExternAnswer, ...] = (),
+    found: Mapping[str, Value] | None = None,
 ) -> CycleRun:
-    """Run one cycle, in which extern procedures give these answers."""
+    """Run one cycle, in which extern procedures give these answers; `found`: the states of monitors, None where they begin."""
     with scripted(ts.program, answers):
         outcome = cycle(ts.program, ts.level, {**before, **taken})
-    return _step(ts, before, taken, outcome, answers)
+    ran = _step(ts, before, taken, outcome, answers)
+    found = begin(ts.program) if found is None else found
+    return replace(ran, found=dict(found), left=step(ts.program, found, before, ran.after))
 
 
 @dataclass(slots=True)
@@ -279,8 +291,9 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
         case Sort.INVARIANT:
             kept = invariant_kept(ts, obligation.name, step.before, step.after)
             return not step.ends_the_run and not kept
-        case Sort.PROPERTY:
-            kept = property_kept(ts, obligation.name, step.before, step.after)
+        case Sort.PROPERTY | Sort.REQUIREMENT:
+            ends = {**step.before, **step.found}, {**step.after, **step.left}
+            kept = property_kept(ts, obligation.name, *ends)
             return not step.ends_the_run and not kept
         case Sort.SAFE:
             return ts.safety.within and not step.ends_the_run and _broken_between(ts, obligation, step)
@@ -351,7 +364,8 @@ def _is_false(node: Node) -> bool:
 
 def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
     """Turn a cycle that ran into one of constant nodes."""
-    before, after = _constants(ts, step.before), _constants(ts, step.after)
+    before = _constants(ts, {**step.before, **step.found})
+    after = _constants(ts, {**step.after, **step.left})
     taken = {name: after[name] for name in step.taken}
     half = halfway(ts, step)
     middle = _constants(ts, half.middle)
@@ -381,8 +395,8 @@ def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
 
 
 def _constants(ts: TransitionSystem, state: Mapping[str, Value]) -> Leaves:
+    """Return a state as constant nodes; ghosts that nobody steps are 0, or false."""
     return {
-        name: values.constant(kind, state[name])
+        name: values.constant(kind, state.get(name, 0) if is_ghost(name) else state[name])
         for name, kind in ts.kinds.items()
-        if not name.startswith(GHOST)
-    } | {name: values.constant(kind, 0) for name, kind in ts.kinds.items() if name.startswith(GHOST)}
+    }

@@ -88,7 +88,8 @@ def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Find
     """Make a finding of one level's trace, one cycle longer if a command is passed over, which shows only then."""
     steps = list(trace.steps)
     if obligation.sort is Sort.ANSWERED:
-        steps.append(one_cycle(ts, steps[-1].after, steps[-1].taken, steps[-1].answers))
+        last = steps[-1]
+        steps.append(one_cycle(ts, last.after, last.taken, last.answers, last.left))
     ticks = tuple({ts.level.name: step} for step in steps)
     after = len(steps) - len(trace.steps)
     return Finding(ts.level.name, obligation, ticks, after, trace.restarted, trace.legal)

@@ -215,13 +215,15 @@ def case_breaks(case: FrozenCase) -> bool:
     exchanged = exchange(systems, tuple(systems))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
     so_far: list[CycleRun] = []
+    found: dict[str, Mapping[str, Value]] = {}
     answers = (*case.answers, *({} for _ in case.ticks[len(case.answers) :]))
     for tick, answered in zip(case.ticks, answers, strict=False):
         steps = {}
         for name, changed in tick.items():
             taken = _taken(systems[name], now[name], changed) | given[name]
             results = tuple(_answer(systems[name], answer) for answer in answered.get(name, ()))
-            steps[name] = one_cycle(systems[name], now[name], taken, results)
+            steps[name] = one_cycle(systems[name], now[name], taken, results, found.get(name))
+        found |= {name: step.left for name, step in steps.items()}
         now |= {name: dict(step.after) for name, step in steps.items()}
         for name, leaves in exchanged.items():
             given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.watched import begin
 from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, as_declared, ran_on
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.proof.termination import answered, unanswered
@@ -87,8 +88,8 @@ def comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> No
 
 
 def _moving(ts: TransitionSystem) -> set[str]:
-    """Return the leaves that go on: numbers of orders, and their echoes."""
-    return {leaf for below in ts.links.below for leaf in (below.number, below.echo)}
+    """Return the leaves that go on: numbers of orders, and their echoes; and monitors, which no level reads."""
+    return {leaf for below in ts.links.below for leaf in (below.number, below.echo)} | set(begin(ts.program))
 
 
 def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso | NotReproducedError:

@@ -240,6 +240,7 @@ class _Together:
     def _ran(self, settled: Simplest) -> Iterator[dict[str, CycleRun]]:
         now = {side.name: {**initial(side.ts.program), **side.begins} for side in self.sides}
         held = {leaf: now[side.name][leaf] for side in self.sides for leaf in side.takes}
+        found: dict[str, Mapping[str, Value]] = {}
         runs = [
             settled.settle([side.runs[at] for side in self.sides], [True, True])
             for at in range(len(self.sides[0].runs))
@@ -256,7 +257,10 @@ class _Together:
                         leaf: seen[leaf] for leaf in side.takes
                     }
                     answers = settled.answers(side.ts.program, side.cycles[at])
-                    steps[side.name] = one_cycle(side.ts, now[side.name], taken, answers)
+                    steps[side.name] = one_cycle(
+                        side.ts, now[side.name], taken, answers, found.get(side.name)
+                    )
+                    found[side.name] = steps[side.name].left
                     now[side.name] = dict(steps[side.name].after)
                     self._publish(side, now[side.name], held)
             yield steps

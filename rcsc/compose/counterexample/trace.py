@@ -16,6 +16,7 @@ from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, obligations, pairs
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, successor
+from rcsc.compose.contract.watched import begin
 from rcsc.compose.counterexample.cycle_run import CycleRun, Given, as_declared, broken, ran_on
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
 from rcsc.compose.invariant.pdr import Clause
@@ -283,7 +284,7 @@ class Unrolled:
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
         """Fix every leaf before the first cycle."""
-        begun = {**initial(self.ts.program), **self.search.start}
+        begun = {**initial(self.ts.program), **begin(self.ts.program), **self.search.start}
         if self.search.restarted or self.search.invariant is not None:
             # A state adopted from an input has its value.
             of_input = {self._start[name]: begun[name] for name in self.ts.inputs}

@@ -199,7 +199,7 @@ def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Ca
                 Sort.DONE_STAYS,
                 Sort.FAILED_STAYS,
             }  # no line in context and no ending goes by them
-            aside |= {Sort.PROPERTY} if ts.refuses else set()
+            aside |= {Sort.PROPERTY, Sort.REQUIREMENT} if ts.refuses else set()
             looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
             flow = Flow(ts, asked, invariant.clauses)
             if looks and (

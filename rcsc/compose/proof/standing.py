@@ -26,9 +26,9 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
 
-ASSUMPTION, PROPERTY = "assumption", "property"
+ASSUMPTION = "assumption"
 SOME_LINE, ONE_LINE = "some line matches", "no two lines match"
-"""Sorts of obligations: a table's assumption, a property."""
+"""Sorts of obligations."""
 
 
 class KnownVerdict(StrEnum):
@@ -119,7 +119,7 @@ class LevelOutline:
     Attributes:
         content: Digest of all that a proof of it depends on.
         file: Real path of the file that declares it; `start` and `end`, where its name stands there.
-        properties: Each with the real path of the file that states it.
+        properties: The key of each, and of each requirement over time, with the real path of the file that states it.
     """
 
     name: str
@@ -128,7 +128,7 @@ class LevelOutline:
     start: int
     end: int
     tables: tuple[TableOutline, ...]
-    properties: tuple[tuple[str, str], ...]
+    properties: tuple[tuple[Key, str], ...]
 
 
 @dataclass(frozen=True, slots=True)

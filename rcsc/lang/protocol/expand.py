@@ -65,7 +65,7 @@ def _made(parties: Parties, whole: Sequence[tree.Declaration]) -> Iterator[str]:
     if parties.subordinates and "settle" not in own:
         yield from written.settle(parties)
     yield from _members(parties, called)
-    claims = (tree.AssumeDecl, tree.InvariantDecl, tree.PropertyDecl)
+    claims = (tree.AssumeDecl, tree.InvariantDecl, tree.PropertyDecl, tree.RequirementDecl)
     yield from written.properties(parties, {d.name.text for d in whole if isinstance(d, claims)})
 
 

@@ -194,6 +194,39 @@ class Build:
         other = self.expr(last[0].children[0]) if last else None
         return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
 
+    def _requirement_decl(self, node: ParseNode) -> tree.RequirementDecl:
+        head = self._required(node)
+        name, *parts, response = (part for part in node.children if self._rule(part) != "req")
+        scope, asks, takes = (self._worded(parts, before) for before in ("in_", "asks_", "takes_"))
+        mode, *end = scope[1]
+        time = takes[1][0] if isinstance(takes[1][0], tree.Time) else None
+        return tree.RequirementDecl(
+            self._name(name),
+            scope[0],
+            mode,
+            asks[0],
+            asks[1][0],
+            takes[0],
+            self.expr(response),
+            time,
+            None if time is not None else takes[1][0],
+            end[0] if end else None,
+            **head,
+        )
+
+    def _worded(self, parts: Sequence[Any], before: str) -> tuple[str, list[Any]]:
+        """Return the words of a part of a requirement, after which its rule is called, and what stands after them; None for nothing."""
+        part = next((part for part in parts if self._rule(part).startswith(before)), None)
+        if part is None:
+            return "", [None]
+        inside = [child for child in part.children if getattr(child, "type", "") != "WHEN"]
+        times = ("lasting_time", "cycles_time")
+        stands = [self._time(child) if self._rule(child) in times else self.expr(child) for child in inside]
+        return self._rule(part).removeprefix(before).replace("_", " "), stands or [None]
+
+    def _time(self, node: ParseNode) -> tree.Time:
+        return tree.Time(self.expr(node.children[0]), self._rule(node) == "cycles_time", self._span(node))
+
     def _procedure_decl(self, node: ParseNode) -> tree.ProcedureDecl:
         return self._procedure(node, "procedure")
 

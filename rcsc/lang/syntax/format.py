@@ -12,6 +12,7 @@ from rcsc.lang.syntax.spell import (
     spell_expr,
     spell_field,
     spell_req,
+    spell_required,
     spell_set,
     spell_statement,
     spell_turned,
@@ -19,7 +20,8 @@ from rcsc.lang.syntax.spell import (
 )
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.SetDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
-         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl, tree.AdoptDecl)  # fmt: skip
+         tree.PropertyDecl, tree.RequirementDecl, tree.EnumDecl, tree.OwnerDecl, tree.ServesDecl, tree.CommandsDecl,
+         tree.AdoptDecl)  # fmt: skip
 
 
 def format_file(file: tree.File, width: int = WIDTH) -> str:
@@ -66,6 +68,8 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
             yield _variable(declaration)
         case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
             yield _claim(declaration)
+        case tree.RequirementDecl(name):
+            yield f"requirement {name.text}{spell_req(declaration)} : {spell_required(declaration)}"
         case tree.ProcedureDecl():
             yield from _procedure(declaration)
         case tree.OwnerDecl(name, members):

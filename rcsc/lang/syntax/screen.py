@@ -19,7 +19,7 @@ MOST_NAME = 1000
 _TOKEN = re.compile(r'#[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]')
 _LONG = re.compile(rf'#[^\r\n]*|"[^"\\\n]*"|(?P<name>(?<![A-Za-z0-9_])[A-Za-z_][A-Za-z0-9_]{{{MOST_NAME},}})')
 _DECLARATION = re.compile(
-    r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|property|procedure|module|extern"
+    r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|property|requirement|procedure|module|extern"
     r"|owner|table|link|serves|commands|adopt|level)\b",
     re.MULTILINE,
 )

@@ -1,6 +1,6 @@
 """Expressions, types and conditions as text, with no more parentheses than are needed."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from typing import assert_never
 
 from rcsc.lang.operator_table import (
@@ -27,6 +27,41 @@ def spell_names(names: Iterable[tree.Name]) -> str:
 def spell_req(declaration: tree.Required) -> str:
     """Return the requirements of a declaration, with a blank before them; "" for none."""
     return f" req {spell_names(declaration.requirements)}" if declaration.requirements else ""
+
+
+_AFTER_A_SCOPE = frozenset(
+    "when whenever at next always never eventually within for exactly until before".split()
+)
+"""Words that would make a scope of `before c,`; a response that begins with a variable called so stands in parentheses."""
+
+
+def spell_required(one: tree.RequirementDecl) -> str:
+    """Return what a requirement says: scope, trigger, timing and response."""
+    response = spell_expr(one.response)
+    if one.timing == "before" and response.partition(" ")[0].partition(".")[0] in _AFTER_A_SCOPE:
+        response = f"({response})"
+    return "".join((*_in_scope(one), *_asks(one), *_takes(one), response))
+
+
+def _in_scope(one: tree.RequirementDecl) -> Iterator[str]:
+    if one.mode is not None and one.end is not None:
+        word, least = ("and", NEGATION) if one.scope == "between" else ("until", 0)
+        yield f"{one.scope} {spell_expr(one.mode, least)} {word} {spell_expr(one.end, least)}, "
+    elif one.mode is not None:
+        yield f"{one.scope} {spell_expr(one.mode)}, "
+
+
+def _asks(one: tree.RequirementDecl) -> Iterator[str]:
+    if one.condition is not None:
+        yield f"{one.trigger} {spell_expr(one.condition)}, "
+
+
+def _takes(one: tree.RequirementDecl) -> Iterator[str]:
+    yield f"{one.timing} "
+    if one.time is not None:
+        yield f"{spell_expr(one.time.value, SUM)}{' cycles' if one.time.cycles else ''}, "
+    if one.stop is not None:
+        yield f"{spell_expr(one.stop)}, "
 
 
 def spell_expr(expr: tree.Expr, least: int = 0) -> str:

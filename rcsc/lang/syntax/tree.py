@@ -694,6 +694,38 @@ class PropertyDecl(Required):
 
 
 @dataclass(frozen=True, slots=True)
+class Time:
+    """`200 [ms]`, or `3 cycles`."""
+
+    value: Expr
+    cycles: bool
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementDecl(Required):
+    """`requirement name [req ..] : [while c,] [when c,] within time, expr`: scope, trigger, timing and response.
+
+    Attributes:
+        scope: The words of the scope; "" for none. `mode` is its condition, and `end` that of its end, where it has one.
+        trigger: "", "when" or "whenever"; `condition` stands after it.
+        timing: The words of the timing; `time` or `stop` stands after them where they need one.
+        response: What has to hold.
+    """
+
+    name: Name
+    scope: str
+    mode: Expr | None
+    trigger: str
+    condition: Expr | None
+    timing: str
+    response: Expr
+    time: Time | None = None
+    stop: Expr | None = None
+    end: Expr | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """`name : type` of a procedure."""
 
@@ -859,6 +891,7 @@ Declaration: TypeAlias = (
     | AssumeDecl
     | InvariantDecl
     | PropertyDecl
+    | RequirementDecl
     | ProcedureDecl
     | OwnerDecl
     | TableDecl

@@ -79,6 +79,9 @@ def _broken_by_a_restart(
     )
 
 
+_MANY = {"property": "properties", "requirement": "requirements"}
+
+
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
     """Yield a note for each file that declares properties: a program alone proves none.
 
@@ -90,7 +93,10 @@ def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
         files.setdefault(claim.span.file, []).append(claim)
     for declared in files.values():
         names = ", ".join(f"`{claim.name}`" for claim in declared)
-        what, is_ = ("property", "is") if len(declared) == 1 else ("properties", "are")
+        [*words] = dict.fromkeys(
+            claim.word if len(declared) == 1 else _MANY[claim.word] for claim in declared
+        )
+        what, is_ = " and ".join(words), "is" if len(declared) == 1 else "are"
         message = f"{what} {names} {is_} not proved here"
         helps = ("`rcsc prove` proves what a level does in its environment, cycle after cycle",)
         label = Label(declared[0].span)

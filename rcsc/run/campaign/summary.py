@@ -30,6 +30,7 @@ _KINDS = {
     "GIVEN": "facts of other levels",
     "STANDS": "answers stand",
     "PROPERTY": "properties",
+    "REQUIREMENT": "requirements over time",
     "ENDS": "commands end",
     "CONTRACT": "agreements",
     "SAFE": "values in range",

@@ -10,6 +10,7 @@ from rcsc.lang import model
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import BEFORE, Value
+from rcsc.lang.over_time import Watch
 from rcsc.run.episodes.cycle import Broken, Cycle, Property
 from rcsc.run.episodes.operator import Given
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
@@ -146,14 +147,48 @@ class LevelProperty:
             return f"not defined ({error}): "
 
 
+@dataclass(slots=True)
+class LevelRequirement:
+    """A requirement over time that a program declares. Each cycle of the level is one of the run, a refused one, too.
+
+    Attributes:
+        reads: Where what it reads stands among the level's values.
+    """
+
+    level: str
+    its: Watch
+    reads: Mapping[str, int]
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Yield the values of the cycle that breaks it."""
+        level = cycle.levels[self.level]
+        if self.level in cycle.restarted:
+            self.its.begin()
+        if level not in cycle.ran or self.its.keeps(self._of(cycle.left[self.level]), self._of(level.values)):
+            return
+        leaves = level.sign.leaves
+        words = ", ".join(
+            f"`{name}` = {leaves[at].shown(level.values[at])}" for name, at in self.reads.items()
+        )
+        where = level.ran if level.level.stages else f"line `{level.line}`"
+        text = f"`{self.its.stated.text}` is broken in {where}: {words}"
+        yield Broken(f"{self.level}: {self.its.stated.name}", text, self.level)
+
+    def _of(self, values: Values) -> dict[str, Value]:
+        return {name: values[at] for name, at in self.reads.items()}
+
+
 def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
     """Return what a cycle left, with the inputs that were taken last: a refused one took none."""
     inputs = {at for at, leaf in enumerate(level.sign.leaves) if leaf.kind == "input"}
     return tuple(taken[at] if at in inputs else value for at, value in enumerate(left))
 
 
-def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty:
-    reads = list(dict.fromkeys(map(str, read_by(stated.condition))))
+def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty | LevelRequirement:
+    reads = list(dict.fromkeys(str(name) for condition in stated.about for name in read_by(condition)))
+    if stated.monitor is not None:
+        names = dict.fromkeys(name.removeprefix(BEFORE) for name in reads)
+        return LevelRequirement(level, Watch(stated), {name: sign.index[name] for name in names})
     now = {name: sign.index[name] for name in reads if not name.startswith(BEFORE)}
     before = {name: sign.index[name.removeprefix(BEFORE)] for name in reads if name.startswith(BEFORE)}
     return LevelProperty(level, stated, now, before)

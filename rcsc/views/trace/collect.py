@@ -18,7 +18,7 @@ from rcsc.base.host.cache import Cache, cache_of, open_cache
 from rcsc.base.host.files.read import json_of
 from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
-from rcsc.compose.proof.standing import PROPERTY, KnownVerdict
+from rcsc.compose.proof.standing import KnownVerdict
 from rcsc.driver.compile import Generated, code_of, files_of, files_of_system, planned, systems_in, tables_in
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
@@ -174,11 +174,11 @@ def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
         if standing is None:
             continue
         for level in standing.outline.levels:
-            for name, file in level.properties:
-                if own.get(name) == file:
-                    state = standing.of_obligation(level.name, (PROPERTY, "", name))
+            for key, file in level.properties:
+                if own.get(key[2]) == file:
+                    state = standing.of_obligation(level.name, key)
                     if state in _SAID:
-                        yield name, f"{_SAID[state]}, {os.path.relpath(system)}"
+                        yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
         return
 
 

@@ -262,7 +262,7 @@ class _Build:
         self.program: Program = plan.program
         self.procedures: dict[str, Procedure] = {str(one.name): one for one in self.program.procedures}
         self.spoken = {
-            one.name: {leaf.removeprefix(BEFORE) for leaf in read_by(one.condition)}
+            one.name: {leaf.removeprefix(BEFORE) for condition in one.about for leaf in read_by(condition)}
             for one in self.program.properties
         }
 

@@ -362,7 +362,38 @@ def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
         st.builds(tree.InvariantDecl, NAMES, expressions(), **_REQUIRED),
         st.builds(tree.PropertyDecl, NAMES, expressions(), **_REQUIRED),
         st.builds(tree.PropertyDecl, NAMES, expressions(), words, expressions(), **_REQUIRED),
+        _requirements(),
     )
+
+
+def _requirements() -> SearchStrategy[tree.Declaration]:
+    """Draw a requirement: what stands after each word is there where the word takes it."""
+    one, of_two = (
+        ("while", "unless", "before", "after", "only while", "only before", "only after"),
+        ("between", "from"),
+    )
+    plain = ("at once", "next", "always", "never", "eventually", "at last")
+    timed, stopped = ("within", "for", "exactly after"), ("until", "before")
+    none, times = st.none(), st.builds(tree.Time, expressions(), st.booleans())
+
+    def built(scope: str, trigger: str, timing: str) -> SearchStrategy[tree.Declaration]:
+        return st.builds(
+            tree.RequirementDecl,
+            NAMES,
+            st.just(scope),
+            expressions() if scope else none,
+            st.just(trigger),
+            expressions() if trigger else none,
+            st.just(timing),
+            expressions(),
+            times if timing in timed else none,
+            expressions() if timing in stopped else none,
+            expressions() if scope in of_two else none,
+            **_REQUIRED,
+        )
+
+    words = (("", *one, *of_two), ("", "when", "whenever"), (*plain, *timed, *stopped))
+    return st.tuples(*map(st.sampled_from, words)).flatmap(lambda drawn: built(*drawn))
 
 
 def _procedures() -> SearchStrategy[tree.Declaration]:

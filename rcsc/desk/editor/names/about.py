@@ -216,8 +216,9 @@ def _claim(program: Program, name: str) -> Iterator[str]:
             )
     if any(invariant.name == name for invariant in program.invariants):
         yield "invariant: true at first and kept by every cycle; proved with the tables, which may rest on it"
-    if any(each.name == name for each in program.properties):
-        yield "property: proved of the levels together, by `rcsc prove`"
+    for each in program.properties:
+        if each.name == name:
+            yield f"{each.word}: proved of the levels together, by `rcsc prove`"
 
 
 def _listed(words: list[str]) -> str:

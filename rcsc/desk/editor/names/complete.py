@@ -22,8 +22,8 @@ from rcsc.lang.written.tables import RowText, cells_of, tables_of
 MOST = 400
 """Offers at once; who types on gets fewer."""
 DECLARATIONS = (
-    "use", "unit", "const", "set", "enum", "type", "record", "input", "state", "output", "assume", "invariant", "property", "procedure",
-    "module", "extern", "owner", "table", "link", "serves", "commands", "adopt", "level",
+    "use", "unit", "const", "set", "enum", "type", "record", "input", "state", "output", "assume", "invariant", "property",
+    "requirement", "procedure", "module", "extern", "owner", "table", "link", "serves", "commands", "adopt", "level",
 )  # fmt: skip
 TYPES = ("bool", "int", "real", "single", "array")
 _FIELD = re.compile(r"([A-Za-z_][\w.\[\]]*)\.\w*$", re.ASCII)

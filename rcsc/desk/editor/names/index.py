@@ -100,6 +100,10 @@ class _Walk:
             case tree.PropertyDecl(name, condition):
                 yield self.name(Space.CLAIM, name, node)
                 yield from self.exprs((condition, node.other))
+            case tree.RequirementDecl(name):
+                yield self.name(Space.CLAIM, name, node)
+                yield from self.exprs((node.mode, node.end, node.condition, node.stop, node.response))
+                yield from self.exprs(() if node.time is None else (node.time.value,))
             case tree.ProcedureDecl():
                 yield from self.procedure(node)
             case tree.OwnerDecl(name, members):

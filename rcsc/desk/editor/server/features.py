@@ -51,7 +51,8 @@ _SYMBOLS = {
     "const": types.SymbolKind.Constant, "set": types.SymbolKind.Constant, "table": types.SymbolKind.Class,
     "level": types.SymbolKind.Module, "procedure": types.SymbolKind.Function, "module": types.SymbolKind.Function,
     "extern": types.SymbolKind.Function, "owner": types.SymbolKind.Object, "assume": types.SymbolKind.Event,
-    "invariant": types.SymbolKind.Event, "property": types.SymbolKind.Event, "link": types.SymbolKind.Interface,
+    "invariant": types.SymbolKind.Event, "property": types.SymbolKind.Event, "requirement": types.SymbolKind.Event,
+    "link": types.SymbolKind.Interface,
 }  # fmt: skip
 _WORDS = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 

@@ -99,7 +99,7 @@ def _say_logs(explanation: Explanation) -> None:
 
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
     """Return the property's source text, or "" where it is none."""
-    if explanation.obligation.sort is not Sort.PROPERTY:
+    if explanation.obligation.sort not in {Sort.PROPERTY, Sort.REQUIREMENT}:
         return ""
     return next(
         stated.text

@@ -12,6 +12,7 @@ from functools import partial
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Value, pending
+from rcsc.lang.over_time import Watch
 from rcsc.lang.restart import NUMBERS
 from rcsc.run.episodes.proved.claims import Claim, ProvedLevel, WatchedNeighbour
 from rcsc.run.episodes.proved.cycles import EXTERN, FLAG, Now, Reader, told
@@ -115,9 +116,19 @@ def _owed(claim: Claim, reader: Reader, _: ProvedLevel) -> Check:
 
 def _property(claim: Claim, reader: Reader, _: ProvedLevel) -> Check:
     stated = next(stated for stated in reader.program.properties if stated.name == claim.name)
-    reads = tuple(dict.fromkeys(map(str, read_by(stated.condition))))
+    reads = tuple(dict.fromkeys(str(name) for condition in stated.about for name in read_by(condition)))
+    watch = None if stated.monitor is None else Watch(stated)
 
     def check(now: Now) -> str:
+        if watch is not None:
+            if now.begins:
+                watch.begin()
+            kept = watch.keeps(reader.snapshot(now.before), reader.snapshot(now.values))
+            return (
+                ""
+                if kept
+                else f"`{stated.text}` is broken: {told(reader, iter(reads), now.values, now.before)}"
+            )
         if reader.true(stated.condition, now.values, now.before):
             return ""
         return f"`{stated.text}` is false: {told(reader, iter(reads), now.values, now.before)}"
@@ -401,6 +412,7 @@ _MAKERS: Mapping[str, Callable[[Claim, Reader, ProvedLevel], Check]] = {
     "SAFE": _safe,
     "INVARIANT": _invariant,
     "PROPERTY": _property,
+    "REQUIREMENT": _property,
     "OWED": _owed,
     "ECHOES": _echoes,
     "NUMBERED": _numbered,

@@ -18,7 +18,7 @@ class Trusted:
     """Something that a claim takes for granted, for which no level is responsible.
 
     Attributes:
-        kind: Which kind of trust, by its name in `rcsc.compose.contract.trusts`; empty for one that is not known there.
+        kind: Which kind of trust, by its name in `rcsc.compose.contract.claims`; empty for one that is not known there.
         level: The level that it is about, or the neighbour.
         name: The assumption or the record that it is about.
         words: As `rcsc prove` prints it.

@@ -27,6 +27,7 @@ class Now:
         stood: The same of the last cycle that took its inputs.
         values: All leaves now, inputs as they were taken.
         anew: Whether it is the first cycle, or the first after a restart, that takes its inputs; `restarted`, the latter.
+        begins: Whether it is the first cycle, or the first after a restart, whatever it takes.
         lines: Table and line of each that ran.
         seen: All leaves as the first table saw them, once that was computed (`Reader.prepared`).
     """
@@ -38,6 +39,7 @@ class Now:
     fault: int
     anew: bool
     restarted: bool
+    begins: bool
     lines: tuple[tuple[str, str], ...]
     seen: dict[str, Value] | None = field(default=None)
 

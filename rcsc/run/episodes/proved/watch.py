@@ -52,6 +52,7 @@ class ProvedHolds:
         self._stood: dict[str, Values] = {}
         self._anew: set[str] = set(self._readers)
         self._restarted: set[str] = set()
+        self._begins: set[str] = set(self._readers)
 
     def _take(self, level: ProvedLevel) -> None:
         reader, ending = self._readers[level.name], dict[str, Claim]()
@@ -77,6 +78,7 @@ class ProvedHolds:
             self._before[name] = self._stood[name] = cycle.before[name]
             self._anew.add(name)
             self._restarted.add(name)
+            self._begins.add(name)
         ran = [(level.name, self._now(cycle, level)) for level in cycle.ran if level.name in self._readers]
         for name, now in ran:
             self._trusts.watch(name, now)
@@ -96,9 +98,10 @@ class ProvedHolds:
         name, values = level.name, level.values
         before = self._before.get(name) or cycle.before[name]
         stood = self._stood.setdefault(name, before)
-        anew = name in self._anew, name in self._restarted
+        anew = name in self._anew, name in self._restarted, name in self._begins
         now = Now(level, before, stood, values, level.fault, *anew, level.lines)
         self._before[name] = values
+        self._begins.discard(name)
         if now.took:
             self._stood[name] = values
             self._anew.discard(name)

@@ -196,7 +196,7 @@ _COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
     "procedures": ("procedure", {"body": (), "reads": (), "writes": ()}),
     "assumptions": ("assumption", {"condition": None, "standing": None}),
     "invariants": ("invariant", {"condition": None}),
-    "properties": ("property", {"condition": None}),
+    "properties": ("property", {"condition": None, "monitor": None}),
     "tables": (
         "table",
         {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": (), "meetings": ()},
@@ -320,6 +320,11 @@ def _properties(versions: Versions) -> Iterator[ComparedPart]:
         if name not in new or name not in old:
             only = old[name] if name in old else new[name]
             yield ComparedPart("property", name, (f"{'gone' if name in old else 'new'}: {_words(only)}",))
+            continue
+        if old[name].monitor is not None or new[name].monitor is not None:
+            same = replace(old[name], text="", doc="") == replace(new[name], text="", doc="")
+            apart = [] if same else [f"{_words(old[name])} -> {_words(new[name])}"]
+            yield ComparedPart("property", name, tuple(apart), basis=Basis.DIGEST)
             continue
         part = _condition(versions, "property", name, (old[name].condition, new[name].condition))
         notes = (f"{_words(old[name])} -> {_words(new[name])}",) if part.changes else part.notes

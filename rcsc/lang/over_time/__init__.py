@@ -1,0 +1,33 @@
+"""Requirements over time, each as a deterministic monitor.
+
+A *requirement* has a *scope* (in which cycles it applies), a *trigger* (which of these ask for something), a *timing* (when it has to
+come) and a *response* (what has to hold). The scope cuts a run into *intervals*, each judged by itself. A *monitor* looks at each cycle
+once, keeps a few truth values and bounded counters, and tells in which cycle the requirement is broken. No other requirement is left: all
+that is said of time is a condition on one cycle and these states, so that whoever proves a property, or watches one, does it as ever.
+
+>>> from rcsc.lang.model import Bool, Read, VariableName
+>>> from rcsc.lang.over_time import Requirement, Timing, Trigger, begun, monitored, stepped
+>>> asked, given = (Read(VariableName(name), Bool()) for name in ("asked", "given"))
+>>> monitor, kept = monitored("answered", Requirement(Timing.WITHIN, given, Trigger.WHEN, asked, cycles=2))
+>>> state = begun(monitor)
+>>> for cycle in ({"asked": True, "given": False}, {"asked": False, "given": False}, {"asked": False, "given": False}):
+...     state, good = stepped(monitor, kept, state, {}, cycle)
+...     print(good)
+True
+True
+False
+
+Words, scopes and timings: Giannakopoulou, Pressburger, Mavridou and Schumann, *Automated formalization of structured natural language
+requirements*, Information and Software Technology 137 (2021). Each monitor is held against the formulas that FRET publishes.
+
+Trusted: all of it, for what a requirement means. Cost: a monitor has at most six states besides the truths that it looks at, but for
+*exactly after* in an `only` scope, which has one for each cycle of its time.
+
+Modules, in the order the data flows: `requirement` (what is said), `monitor` (its states and statements), `run` (a monitor over a run).
+"""
+
+from rcsc.lang.over_time.monitor import monitored
+from rcsc.lang.over_time.requirement import Requirement, Scope, Timing, Trigger
+from rcsc.lang.over_time.run import Watch, begun, stepped
+
+__all__ = ["Requirement", "Scope", "Timing", "Trigger", "Watch", "begun", "monitored", "stepped"]

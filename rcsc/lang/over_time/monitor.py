@@ -1,0 +1,324 @@
+"""A requirement as a deterministic monitor, in the language's own statements.
+
+In: a requirement. Out: its `Monitor`, and the condition that a cycle keeps it. Three parts follow each other in each cycle: whether the
+cycle is in the scope, whether it asks for the response, and what the timing makes of both. An interval ends in the cycle before the one
+that is not in the scope: so what is wrong with its last cycle is told a cycle later, and by `owes` at the end of a run.
+
+Outside its scope an `only` requirement is the dual timing of the negated response: not (P for T) is (not P) within T, and so on. Only
+*exactly after* has no dual among the timings.
+
+Source of the meaning: the interval semantics of FRET, as its manual and its formulas have it
+(https://github.com/NASA-SW-VnV/fret, release 3.1, `fret-electron/app/parser/semantics.json`).
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+
+from rcsc.lang.model import (
+    WATCHED,
+    Apply,
+    Assign,
+    Bool,
+    Expr,
+    Hidden,
+    If,
+    Int,
+    Literal,
+    Monitor,
+    Op,
+    Read,
+    Scalar,
+    Statement,
+    ToLeaf,
+    Value,
+    VariableName,
+    earlier,
+)
+from rcsc.lang.over_time.requirement import STOPPED, TRUE, Requirement, Scope, Timing, Trigger
+
+FALSE = Literal(value=False, type=Bool())
+MOST_REMEMBERED = 64
+"""The most cycles of *exactly after* in an `only` scope under a trigger: each needs a state of its own."""
+
+_DUAL = {
+    Timing.AT_ONCE: Timing.AT_ONCE,
+    Timing.NEXT: Timing.NEXT,
+    Timing.ALWAYS: Timing.EVENTUALLY,
+    Timing.EVENTUALLY: Timing.ALWAYS,
+    Timing.AT_LAST: Timing.AT_LAST,
+    Timing.WITHIN: Timing.FOR,
+    Timing.FOR: Timing.WITHIN,
+    Timing.UNTIL: Timing.BEFORE,
+    Timing.BEFORE: Timing.UNTIL,
+}
+
+
+def monitored(name: str, required: Requirement) -> tuple[Monitor, Expr]:
+    """Return the monitor of the requirement called so, and the condition that a cycle keeps it.
+
+    The condition reads the monitor's states alone: as the cycle leaves them, and as it finds them (`earlier`).
+    """
+    made = _Made(name)
+    defined = made.state("defined", Bool(), initial=True)
+    in_scope = made.scope(required)
+    asks = made.trigger(required, in_scope)
+    broken, owes = made.timing(required, in_scope, asks)
+    if required.scope is Scope.BETWEEN:
+        broken, owes = made.once_ended(in_scope, broken), FALSE
+    monitor = Monitor(tuple(made.states), defined.name, tuple(made.truths), tuple(made.statements), owes)
+    return monitor, both(defined.now, negation(broken))
+
+
+# --- conditions ------------------------------------------------------------------------------
+
+
+def negation(term: Expr) -> Expr:
+    """Return the negation; of a constant, a constant."""
+    if isinstance(term, Literal):
+        return Literal(value=not term.value, type=Bool())
+    if isinstance(term, Apply) and term.op is Op.NOT:
+        return term.args[0]
+    return Apply(Op.NOT, (term,), Bool())
+
+
+def both(*terms: Expr) -> Expr:
+    """Return the conjunction, without constants."""
+    return _joined(Op.AND, TRUE, FALSE, terms)
+
+
+def either(*terms: Expr) -> Expr:
+    """Return the disjunction, without constants."""
+    return _joined(Op.OR, FALSE, TRUE, terms)
+
+
+def _joined(op: Op, neutral: Literal, deciding: Literal, terms: Iterable[Expr]) -> Expr:
+    left = [term for term in terms if term != neutral]
+    if deciding in left:
+        return deciding
+    return reduce(lambda first, other: Apply(op, (first, other), Bool()), left) if left else neutral
+
+
+def number(value: int) -> Expr:
+    """Return a constant."""
+    return Literal(value, Int(value, value))
+
+
+# --- a monitor in the making -----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """A state: as the cycle finds it, `was`, and as it leaves it, `now`."""
+
+    name: VariableName
+    type: Scalar
+
+    @property
+    def now(self) -> Expr:
+        return Read(self.name, self.type)
+
+    @property
+    def was(self) -> Expr:
+        return Read(earlier(self.name), self.type)
+
+    def was_from(self, low: int, high: int) -> Expr:
+        """Return the condition that the cycle finds it between two numbers."""
+        assert isinstance(self.type, Int)
+        least = TRUE if low <= self.type.low else _compared(Op.GE, self.was, low)
+        return both(least, TRUE if high >= self.type.high else _compared(Op.LE, self.was, high))
+
+    def set(self, value: Expr) -> Statement:
+        return Assign(ToLeaf(self.name, self.type), value)
+
+    def counted(self, by: int) -> Statement:
+        """Return the statement that counts it up or down, from what the cycle finds."""
+        assert isinstance(self.type, Int)
+        op, low, high = (Op.ADD, 1, self.type.high + 1) if by > 0 else (Op.SUB, -1, self.type.high - 1)
+        return self.set(Apply(op, (self.was, number(1)), Int(low, high)))
+
+
+def _compared(op: Op, left: Expr, right: int) -> Expr:
+    return Apply(op, (left, number(right)), Bool())
+
+
+@dataclass(frozen=True, slots=True)
+class _InScope:
+    """Whether the cycle is in the scope, `inside`; whether it is the first that is not, `ended`."""
+
+    inside: Expr
+    was_inside: Expr
+    ended: Expr
+
+
+@dataclass(slots=True)
+class _Made:
+    """A monitor in the making."""
+
+    name: str
+    states: list[Hidden] = field(default_factory=list)
+    truths: list[tuple[VariableName, Expr]] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
+
+    def state(self, part: str, kind: Scalar, initial: Value) -> _State:
+        """Add a state."""
+        made = _State(VariableName(f"{WATCHED}{self.name} {part}"), kind)
+        self.states.append(Hidden(made.name, kind, initial))
+        return made
+
+    def truth(self, part: str, condition: Expr) -> _State:
+        """Add the state that takes the truth of a condition on the level."""
+        made = self.state(part, Bool(), initial=False)
+        self.truths.append((made.name, condition))
+        return made
+
+    def flag(self, part: str, value: Callable[[_State], Expr]) -> _State:
+        """Add a truth value, and its value after each cycle."""
+        made = self.state(part, Bool(), initial=False)
+        self.statements.append(made.set(value(made)))
+        return made
+
+    # --- scope and trigger ---
+
+    def scope(self, required: Requirement) -> _InScope:
+        """Add what tells whether a cycle is in the scope."""
+        if required.scope is Scope.ALL:
+            return _InScope(TRUE, self.flag("inside", lambda _: TRUE).was, FALSE)
+        inside = self._scope(required)
+        return _InScope(inside.now, inside.was, both(inside.was, negation(inside.now)))
+
+    def _scope(self, required: Requirement) -> _State:
+        mode = self.truth("mode", required.mode).now
+        scope = required.scope
+        if scope in {Scope.BETWEEN, Scope.FROM}:
+            end = self.truth("end", required.end).now
+            return self.flag("inside", lambda inside: both(negation(end), either(mode, inside.was)))
+        if scope is Scope.WHILE:
+            return self.flag("inside", lambda _: mode)
+        if scope in {Scope.UNLESS, Scope.ONLY_WHILE}:
+            return self.flag("inside", lambda _: negation(mode))
+        seen = self.flag("seen", lambda seen: either(mode, seen.was))
+        if scope is Scope.BEFORE:
+            return self.flag("inside", lambda _: negation(seen.now))
+        if scope is Scope.ONLY_BEFORE:
+            return self.flag("inside", lambda _: seen.now)
+        over = self.flag("over", lambda over: either(over.was, both(seen.was, negation(mode))))
+        return self.flag("inside", lambda _: over.now if scope is Scope.AFTER else negation(over.now))
+
+    def once_ended(self, scope: _InScope, broken: Expr) -> Expr:
+        """Remember that a cycle broke the requirement; return the condition that the interval ends in which one did."""
+        failed = self.flag("failed", lambda failed: both(scope.inside, either(failed.was, broken)))
+        return both(scope.ended, either(failed.was, broken))
+
+    def trigger(self, required: Requirement, scope: _InScope) -> Expr:
+        """Add what tells whether a cycle asks for the response; return that it does."""
+        if required.trigger is Trigger.FIRST:
+            return both(scope.inside, negation(scope.was_inside))
+        condition = self.truth("condition", required.condition)
+        asks = both(scope.inside, condition.now)
+        if required.trigger is Trigger.WHENEVER:
+            return asks
+        return both(asks, negation(both(scope.was_inside, condition.was)))
+
+    # --- timing ---
+
+    def timing(self, required: Requirement, scope: _InScope, asks: Expr) -> tuple[Expr, Expr]:
+        """Add what the timing remembers; return the conditions that the cycle breaks the requirement, and that it is owed."""
+        response = self.truth("response", required.response).now
+        question = self.flag("asked", lambda _: asks)
+        asked = question.now
+        timing, cycles = required.timing, required.cycles
+        if required.scope.only and timing is Timing.EXACTLY_AFTER:
+            return self._not_exactly_after(required, scope, asked, response)
+        if timing is Timing.NEVER:
+            timing, response = Timing.ALWAYS, negation(response)
+        if required.scope.only:
+            timing, response = _DUAL[timing], negation(response)
+        stop = self.truth("stop", required.stop).now if timing in STOPPED else FALSE
+        match timing:
+            case Timing.AT_ONCE:
+                return both(asked, negation(response)), FALSE
+            case Timing.NEXT:
+                return both(scope.inside, question.was, negation(response)), FALSE
+            case Timing.ALWAYS | Timing.UNTIL:
+                on = self.flag("on", lambda on: both(scope.inside, either(asked, on.was), negation(stop)))
+                return both(on.now, negation(response)), FALSE
+            case Timing.EVENTUALLY:
+                return self._eventually(scope, asked, response)
+            case Timing.AT_LAST:
+                on = self.flag("on", lambda on: both(scope.inside, either(asked, on.was)))
+                missed = self.flag("missed", lambda _: both(on.now, negation(response)))
+                return both(scope.ended, missed.was), missed.now
+            case Timing.WITHIN:
+                return self._within(scope, asked, response, cycles), FALSE
+            case Timing.FOR:
+                return self._for(scope, asked, response, cycles), FALSE
+            case Timing.EXACTLY_AFTER:
+                return self._exactly_after(scope, asked, response, cycles), FALSE
+            case _:
+                return self._before(scope, asked, response, stop), FALSE
+
+    def _eventually(self, scope: _InScope, asked: Expr, response: Expr) -> tuple[Expr, Expr]:
+        owing = self.flag(
+            "owing", lambda owing: both(scope.inside, either(asked, owing.was), negation(response))
+        )
+        return both(scope.ended, owing.was), owing.now
+
+    def _within(self, scope: _InScope, asked: Expr, response: Expr, cycles: int) -> Expr:
+        """Count the cycles for which the oldest question is open: a response answers all of them."""
+        waited = self.state("waited", Int(0, cycles), 0)
+        open_, waiting = both(scope.inside, negation(response)), waited.was_from(1, cycles)
+        late = waited.was_from(cycles, cycles)
+        begins = If(asked, (waited.set(number(1)),), (waited.set(number(0)),))
+        goes_on = If(late, (waited.set(number(0)),), (waited.counted(1),))
+        self.statements.append(
+            If(open_, (If(waiting, (goes_on,), (begins,)),), (waited.set(number(0)),)),
+        )
+        return both(open_, late)
+
+    def _for(self, scope: _InScope, asked: Expr, response: Expr, cycles: int) -> Expr:
+        """Count the cycles that are left of the youngest question: it lasts longest."""
+        left = self.state("left", Int(0, cycles), 0)
+        lasts = both(scope.inside, left.was_from(1, cycles))
+        goes_on = If(lasts, (left.counted(-1),), (left.set(number(0)),))
+        self.statements.append(If(asked, (left.set(number(cycles)),), (goes_on,)))
+        return both(either(asked, lasts), negation(response))
+
+    def _exactly_after(self, scope: _InScope, asked: Expr, response: Expr, cycles: int) -> Expr:
+        """Count from the oldest question. Another in its time forbids the response in the very cycle in which it is due."""
+        age = self.state("age", Int(0, cycles + 1), 0)
+        forbids = both(scope.inside, age.was_from(1, cycles))
+        due = both(scope.inside, age.was_from(cycles + 1, cycles + 1))
+        begins = If(asked, (age.set(number(1)),), (age.set(number(0)),))
+        self.statements.append(If(forbids, (age.counted(1),), (begins,)))
+        again = self.flag("again", lambda again: both(forbids, either(again.was, asked)))
+        early = both(response, either(asked, forbids))
+        return either(early, both(due, either(negation(response), again.was)))
+
+    def _before(self, scope: _InScope, asked: Expr, response: Expr, stop: Expr) -> Expr:
+        """Remember that a question is open: the stop is not to come then, nor in the cycle of the response."""
+        before = self.state("open", Bool(), initial=False)
+        open_ = both(scope.inside, either(asked, before.was))
+        self.statements.append(before.set(both(open_, negation(stop), negation(response))))
+        return both(open_, stop)
+
+    def _not_exactly_after(
+        self, required: Requirement, scope: _InScope, asked: Expr, response: Expr
+    ) -> tuple[Expr, Expr]:
+        """Remember of each cycle of the time whether it asked, and no response came since: it must not come first when that is over."""
+        cycles = required.cycles
+        quiet = both(scope.inside, negation(response))
+        if required.trigger is Trigger.FIRST:  # it asks once in an interval
+            age = self.state("age", Int(0, cycles + 1), 0)
+            begins = If(both(asked, quiet), (age.set(number(1)),), (age.set(number(0)),))
+            self.statements.append(If(both(quiet, age.was_from(1, cycles)), (age.counted(1),), (begins,)))
+            return both(scope.inside, response, age.was_from(cycles + 1, cycles + 1)), FALSE
+        assert cycles <= MOST_REMEMBERED
+        last = self.flag("asked 1", lambda _: both(asked, quiet))
+        for at in range(2, cycles + 2):
+            last = self._next(f"asked {at}", last, quiet)
+        return both(scope.inside, response, last.was), FALSE
+
+    def _next(self, part: str, before: _State, quiet: Expr) -> _State:
+        """Add a flag that is what another one was in the cycle before, if that is still of interest."""
+        return self.flag(part, lambda _: both(quiet, before.was))

@@ -1,0 +1,209 @@
+"""Properties, and requirements over time, as the text says them, to conditions of the model.
+
+In: declarations. Out: a `Property` for each: a condition on a cycle and the one before; of a requirement with the monitor that it reads.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.lang.expressions.previous import MOST_CYCLES, cycles_of
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import boolean, without_before
+from rcsc.lang.expressions.types import constant
+from rcsc.lang.leaves import one_earlier, read_by
+from rcsc.lang.model import Apply, Bool, Expr, Int, Op, Property
+from rcsc.lang.over_time import monitor, requirement
+from rcsc.lang.resolve.declarations import requirements
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_expr, spell_required
+
+
+def stated(scope: Scope, declarations: Iterable[tree.Declaration]) -> tuple[Property, ...]:
+    """Resolve the properties and requirements among declarations, in order; those with an error are left out, and reported."""
+    resolved: list[Property | None] = []
+    for written in declarations:
+        if isinstance(written, tree.PropertyDecl) and scope.claim(written.name, "assumption"):
+            resolved.append(_property(scope, written))
+        elif isinstance(written, tree.RequirementDecl) and scope.claim(written.name, "assumption"):
+            resolved.append(_requirement(scope, written))
+    return tuple(one for one in resolved if one is not None)
+
+
+# --- properties ----------------------------------------------------------------------
+# A property is a condition on a cycle and the one before, whatever words it is written with:
+#
+# - `P` is itself: it holds after every cycle;
+# - `P then Q` is `was P implies Q`: in linear temporal logic, always (P implies next Q);
+# - `P until Q` is `was (P and not Q) implies P or Q`: always (P implies (P weakly until Q)). That Q ever holds is not said; once P
+#   has begun to hold it ends no sooner than in the cycle in which Q holds. Source: *unless*, Chandy and Misra, *Parallel Program Design*
+#   (1988), chapter 3;
+# - `P upon Q` is `P implies was P or Q`: once P does not hold it begins no sooner than in the cycle in which Q holds.
+
+
+def _property(scope: Scope, written: tree.PropertyDecl) -> Property | None:
+    """Resolve a property; None after an error."""
+    text = spell_expr(written.condition)
+    if written.other is None:
+        condition = _condition(scope, written.condition, "")
+    else:
+        form = _FORMS[written.word]
+        text += f" {written.word} {spell_expr(written.other)}"
+        first = _condition(scope, written.condition, form.first_of_one_cycle)
+        other = _condition(scope, written.other, form.other_of_one_cycle)
+        condition = None if first is None or other is None else form.condition(first, other)
+    if condition is None:
+        return None
+    return Property(
+        written.name.text,
+        condition,
+        text,
+        " ".join(written.doc),
+        written.name.span,
+        requirements=requirements(scope, written.requirements),
+    )
+
+
+def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
+    """Resolve a condition that is about some variable; None (reported) where it is about none."""
+    scope.in_property = True
+    with without_before(scope, why_no_before), _with_counters(scope):
+        condition = boolean(scope, Body(), written)
+    scope.in_property = False
+    if condition is not None and next(read_by(condition), None) is None:
+        message = "this is about no variable: it is always so, or never"
+        scope.report(Code.NO_PROPERTY, message, written.span)
+        return None
+    return condition
+
+
+@contextmanager
+def _with_counters(scope: Scope) -> Iterator[None]:
+    """Make the counters of `for` known by name, inside, as witnesses and logs name them."""
+    counters = {declared.name: declared for declared in scope.kept if scope.leaves[declared.leaves[0]].counts}
+    scope.declared |= counters
+    try:
+        yield
+    finally:
+        for name in counters:
+            del scope.declared[name]
+
+
+def _then(first: Expr, other: Expr) -> Expr:
+    return _apply(Op.IMPLIES, one_earlier(first), other)
+
+
+def _until(first: Expr, other: Expr) -> Expr:
+    before = _apply(Op.AND, first, Apply(Op.NOT, (other,), Bool()))
+    return _apply(Op.IMPLIES, one_earlier(before), _apply(Op.OR, first, other))
+
+
+def _upon(first: Expr, other: Expr) -> Expr:
+    return _apply(Op.IMPLIES, first, _apply(Op.OR, one_earlier(first), other))
+
+
+@dataclass(frozen=True, slots=True)
+class _Form:
+    """A word between two conditions.
+
+    Attributes:
+        condition: The condition that the two make, on a cycle and the one before.
+        first_of_one_cycle: Why `was` cannot stand in the first condition; empty where it can. Likewise `other_of_one_cycle`.
+    """
+
+    condition: Callable[[Expr, Expr], Expr]
+    first_of_one_cycle: str
+    other_of_one_cycle: str
+
+
+_FORMS = {
+    "then": _Form(
+        _then, "the left side of `then` looks one cycle back itself, and cannot look back further", ""
+    ),
+    "until": _Form(
+        _until, "the left side of `until` cannot look back", "the right side of `until` cannot look back"
+    ),
+    "upon": _Form(
+        _upon, "the left side of `upon` cannot look back", "the right side of `upon` cannot look back"
+    ),
+}
+
+
+def _apply(op: Op, left: Expr, right: Expr) -> Expr:
+    return Apply(op, (left, right), Bool())
+
+
+# --- requirements over time ----------------------------------------------------------
+
+
+def _requirement(scope: Scope, written: tree.RequirementDecl) -> Property | None:
+    """Resolve a requirement over time; None after an error."""
+    conditions = {"response": written.response, "mode": written.mode, "condition": written.condition, "stop": written.stop,
+                  "end": written.end}  # fmt: skip
+    resolved = {part: _condition(scope, one, "") for part, one in conditions.items() if one is not None}
+    cycles = 0 if written.time is None else _cycles(scope, written.time)
+    if cycles is None or None in resolved.values():
+        return None
+    required = requirement.Requirement(
+        requirement.Timing(written.timing),
+        trigger=requirement.Trigger(written.trigger),
+        scope=requirement.Scope(written.scope),
+        cycles=cycles,
+        **{part: one for part, one in resolved.items() if one is not None},
+    )
+    if not _remembers(scope, written, required):
+        return None
+    name = written.name.text
+    watch, kept = monitor.monitored(name, required)
+    if watch.owes != monitor.FALSE:
+        _without_bound(scope, written)
+        return None
+    named = requirements(scope, written.requirements)
+    return Property(
+        name,
+        kept,
+        spell_required(written),
+        " ".join(written.doc),
+        written.name.span,
+        requirements=named,
+        monitor=watch,
+    )
+
+
+def _cycles(scope: Scope, written: tree.Time) -> int | None:
+    """Return a time in cycles, at least 1; None (reported) where it is none."""
+    value = constant(scope, written.value)
+    if value is None:
+        return None
+    time = value.literal().value
+    if not written.cycles:
+        return cycles_of(scope, time, value.unit(), written.span)
+    if value.unit() or not isinstance(value.expr.type, Int) or not 1 <= time <= MOST_CYCLES:
+        message = f"`{spell_expr(written.value)} cycles` is no number of cycles from 1 to {MOST_CYCLES}"
+        scope.report(Code.NO_CYCLES, message, written.span, "the cycle that asks is `at once`")
+        return None
+    return int(time)
+
+
+def _remembers(scope: Scope, written: tree.RequirementDecl, required: requirement.Requirement) -> bool:
+    """Return whether a monitor can remember what it has to; report where it would need a state for each cycle of a long time."""
+    each = (
+        required.scope.only
+        and required.timing is requirement.Timing.EXACTLY_AFTER
+        and required.trigger is not requirement.Trigger.FIRST
+    )
+    if not each or required.cycles <= monitor.MOST_REMEMBERED:
+        return True
+    assert written.time is not None
+    message = f"`exactly after` under `{written.scope}` and `{written.trigger}` takes at most {monitor.MOST_REMEMBERED} cycles"
+    scope.report(Code.NO_CYCLES, message, written.time.span)
+    return False
+
+
+def _without_bound(scope: Scope, written: tree.RequirementDecl) -> None:
+    """Report a requirement that no cycle breaks, only the end of a run."""
+    what = f"`{written.timing}` in `{written.scope}`" if written.scope else f"`{written.timing}`"
+    message = f"no cycle is too late for {what}: what it asks for may always still come"
+    helps = "say until when: `within TIME,`, or `before CONDITION,`"
+    scope.report(Code.NO_BOUND, message, written.name.span, helps)

@@ -1,0 +1,1 @@
+"""Requirements over time: their monitors, and levels that keep or break them."""

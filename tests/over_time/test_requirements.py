@@ -1,0 +1,294 @@
+"""Requirements over time as a text says them, and of a level: proved where no run breaks them, else with the shortest run that does."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from itertools import product
+
+import pytest
+
+from rcsc.base.diagnostics.source import Source
+from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.contract.transition import REFUSED, TransitionSystem
+from rcsc.compose.contract.watched import begin, is_ghost, step
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.lang.interpret import Fault, cycle, initial
+from rcsc.lang.model import WATCHED, Property, Value
+from rcsc.lang.over_time import Watch
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.proof.symbolic import values
+from tests.support.programs.stages import program_of, refused
+from tests.support.programs.systems import alone
+
+LITTLE = Effort(walks=6, cycles=40)
+
+# --- as text ---------------------------------------------------------------------------------
+
+WORDS = """\
+input before : bool
+input always : bool
+
+state within : bool
+state never : bool
+
+## Doc.
+requirement last req "R1" : at once before
+requirement cycles : while before or always, when within, within 3 cycles, never
+# why
+requirement at : before always, before within, (never)
+requirement once : before always, (never)
+requirement when : before always, (never = always and within)
+requirement next : only after always, whenever within and never, exactly after 200 [ms], not before
+requirement most : between not always and never, always within
+requirement from : from always or never until never, always within implies before
+requirement until : unless always, until never, within
+requirement for : after never, for 2 + 1 cycles, always
+"""
+
+
+def test_requirements_are_laid_out_and_their_words_are_still_names() -> None:
+    laid_out = WORDS.replace("\n# why", "\n\n# why")
+    ragged = WORDS.replace(" : ", "   :  ").replace(", ", " ,\n  ")
+    for text in (WORDS, ragged):
+        parsed = parse(Source("case.rcs", text))
+        assert isinstance(parsed, tree.File)
+        assert format_file(parsed) == laid_out
+
+
+LEVEL = """\
+input asked : bool
+output given : bool
+{}
+table t {{
+  | line | asked || given |
+  |------|-------||-------|
+  | yes  | true  || true  |
+  | no   | false || false |
+}}
+level l {{ period 10 [ms] table t }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("says", "code", "message"),
+    [
+        (
+            "when asked, eventually given",
+            "RCS323",
+            "no cycle is too late for `eventually`: what it asks for may always still come",
+        ),
+        (
+            "only while asked, always given",
+            "RCS323",
+            "no cycle is too late for `always` in `only while`: what it asks for may always still come",
+        ),
+        ("within 0 cycles, given", "RCS317", "`0 cycles` is no number of cycles from 1 to 4294967295"),
+        (
+            "within 3 [ms] cycles, given",
+            "RCS317",
+            "`3 [ms] cycles` is no number of cycles from 1 to 4294967295",
+        ),
+        ("within 15 [ms], given", "RCS317", "`15 [ms]` is no whole number of cycles of 10 ms, 1 or more"),
+        (
+            "only while asked, whenever given, exactly after 65 cycles, given",
+            "RCS317",
+            "`exactly after` under `only while` and `whenever` takes at most 64 cycles",
+        ),
+        ("always true", "RCS316", "this is about no variable: it is always so, or never"),
+        ("while gone, always given", "RCS201", "no variable, constant or member is called `gone`"),
+        ("always was (was given)", "RCS315", None),
+        ("given", "RCS101", None),
+        ("when asked, given", "RCS101", None),
+        ("when asked, while given, always given", "RCS101", None),
+    ],
+)
+def test_what_is_no_requirement_is_told(says: str, code: str, message: str | None) -> None:
+    [found] = refused(LEVEL.format(f"requirement wanted : {says}"))
+    assert found.code == code
+    assert message in {None, found.message}
+
+
+def test_a_time_is_a_number_of_the_levels_cycles() -> None:
+    program = program_of(
+        LEVEL.format(
+            "requirement a : when asked, within 40 [ms], given\n"
+            "requirement b : when asked, within 4 cycles, given"
+        )
+    )
+    first, second = program.properties
+    assert first.monitor is not None
+    assert [state.type for state in first.monitor.states] == [
+        state.type for state in (second.monitor or first.monitor).states
+    ]
+
+
+# --- of a level ------------------------------------------------------------------------------
+
+DOOR = """\
+input asked : bool
+input near : bool
+output given : bool
+state waited : int 0 .. 3
+state busy : bool
+{}
+table t {{
+  | line | asked | near  | waited || given | waited     | busy  |
+  |------|-------|-------|--------||-------|------------|-------|
+  | wait | true  |       | < 2    || false | waited + 1 | true  |
+  | give | true  |       | >= 2   || true  | 0          | true  |
+  | warm | false | true  |        || false | 0          | true  |
+  | idle | false | false |        || false | 0          | false |
+}}
+level l {{ period 10 [ms] table t }}
+"""
+SAID = (
+    "at once not given",
+    "when given, next not given",
+    "when given, for 1 cycles, given",
+    "whenever given, at once busy",
+    "whenever asked, at once busy",
+    "while asked, within 2 cycles, given",
+    "while asked, within 1 cycles, given",
+    "while asked, for 1 cycles, not given",
+    "while asked, for 2 cycles, not given",
+    "while asked, exactly after 2 cycles, given",
+    "while asked, exactly after 1 cycles, given",
+    "while asked, always busy",
+    "unless asked, never given",
+    "unless asked, always busy",
+    "before asked, never given",
+    "before near, never busy",
+    "after asked, never busy",
+    "after asked, before asked, busy",
+    "only while asked, eventually given",
+    "only while asked, eventually busy",
+    "only before asked, at once near",
+    "only after asked, within 2 cycles, busy",
+    "only while near, whenever asked, exactly after 2 cycles, given",
+    "only while near, when asked, exactly after 3 cycles, given",
+    "when asked, until not asked, busy",
+    "when asked, until given, not given",
+    "when asked, before given, near",
+    "when asked, before not busy, asked",
+    "between asked and given, never given",
+    "between asked and given, within 1 cycles, near",
+    "from asked until given, always busy",
+    "from given until not asked, always busy",
+    "whenever was given, at once not given or near",
+    "whenever waited = 2 and asked, at once given",
+    "when waited > was waited, within 2 cycles, waited = 0",
+)
+
+
+def door() -> TransitionSystem:
+    return alone(DOOR.format("\n".join(f"requirement r{at} : {says}" for at, says in enumerate(SAID))))
+
+
+def every_input(ts: TransitionSystem) -> Iterator[dict[str, Value]]:
+    for given in product((False, True), repeat=len(ts.inputs)):
+        yield dict(zip(ts.inputs, given, strict=True))
+
+
+def least_broken(ts: TransitionSystem, stated: Property) -> int:
+    """Return the number of cycles of the shortest run that breaks a requirement, from the initial values or a restart; 0 for none.
+
+    Every state of the level and of the monitor is tried. No state of the level survives a restart here, and inputs are what came last.
+    """
+    watch = Watch(stated)
+    begins = [{**initial(ts.program), **given} for given in every_input(ts)]
+    first = [(begin, dict(watch.state), 0) for begin in begins]
+    seen, waiting = set[tuple[object, ...]](), deque(first)
+    while waiting:
+        before, state, cycles = waiting.popleft()
+        for given in every_input(ts):
+            outcome = cycle(ts.program, ts.level, {**before, **given})
+            assert outcome.fault is Fault.OK
+            watch.state = dict(state)
+            if not watch.keeps(before, outcome.snapshot):
+                return cycles + 1
+            key = (*outcome.snapshot.values(), *watch.state.values())
+            if key not in seen:
+                seen.add(key)
+                waiting.append((outcome.snapshot, dict(watch.state), cycles + 1))
+    return 0
+
+
+def test_proved_is_what_no_run_breaks_and_what_one_breaks_is_shown_by_the_shortest() -> None:
+    ts = door()
+    least = {stated.name: least_broken(ts, stated) for stated in ts.program.properties}
+    assert len(least) == len(SAID)
+    assert {0, 1, 2, 3, 4} <= set(least.values())
+    proof = prove_level(ts, LITTLE)
+    verdicts = {owed.name: verdict for owed, verdict in proof.verdicts if owed.sort is Sort.REQUIREMENT}
+    assert {name for name, verdict in verdicts.items() if verdict is Verdict.PROVED} == {
+        name for name, cycles in least.items() if not cycles
+    }
+    wanted = [owed for owed in obligations(ts, ts.cycle(ts.havoc())) if owed.sort is Sort.REQUIREMENT]
+    found = traces(ts, wanted, TraceSearch(6))
+    for owed in wanted:
+        trace = found.get(owed.key)
+        assert (len(trace.steps) if isinstance(trace, Trace) else 0) == least[owed.name], owed.name
+
+
+def test_monitors_are_stepped_as_nodes_as_they_are_on_a_run() -> None:
+    """From every state of a few, for every input: the cycle as nodes leaves the ghosts that the run leaves."""
+    ts = door()
+    now: Mapping[str, Value] = initial(ts.program)
+    ghosts = begin(ts.program)
+    for at in range(24):
+        given = {"asked": bool(at & 5), "near": bool(at & 2)}
+        outcome = cycle(ts.program, ts.level, {**now, **given})
+        after = step(ts.program, ghosts, now, outcome.snapshot)
+        before = {name: _constant(ts, name, {**now, **ghosts}) for name in ts.kinds}
+        made = ts.cycle(before, taken={name: _constant(ts, name, given) for name in ts.inputs})
+        for name, value in after.items():
+            assert is_ghost(name)
+            assert (made.after[name].known, int(made.after[name].low)) == (True, int(value)), (at, name)
+        now, ghosts = outcome.snapshot, after
+
+
+def _constant(ts: TransitionSystem, name: str, state: Mapping[str, Value]) -> values.Node:
+    return values.constant(ts.kinds[name], state[name])
+
+
+# --- where inputs are refused ----------------------------------------------------------------
+
+GAUGE = """\
+input level_mm : int 0 .. 100
+output drains : bool
+requirement keeps : while level_mm > 50, always drains
+requirement stays : when drains, before not drains, level_mm <= 50 or drains
+requirement never_both : never drains and not drains
+table t {
+  | line | level_mm || drains |
+  |------|----------||--------|
+  | high | > 50     || true   |
+  | low  | <= 50    || false  |
+}
+level l { period 10 [ms] table t }
+"""
+
+
+def test_a_refused_cycle_is_a_cycle_of_the_run() -> None:
+    """What a refused reading shows may be anything, and the level does not act on it."""
+    ts = alone(GAUGE)
+    proof = prove_level(ts, LITTLE)
+    assert {owed.name for owed, verdict in proof.verdicts if owed.sort is Sort.REQUIREMENT and verdict is Verdict.PROVED} == {
+        "keeps", "stays", "never_both",
+    }  # fmt: skip
+    assert proof.needs_admission((Sort.REQUIREMENT, "", "keeps"))
+    assert not proof.needs_admission((Sort.REQUIREMENT, "", "never_both"))
+
+
+def test_what_a_monitor_sees_of_a_refused_reading_is_true_or_false_and_another_truth_in_each_cycle() -> None:
+    ts = alone(GAUGE).refusing()
+    first = ts.cycle(ts.havoc(), " 1")
+    second = ts.cycle(first.after, " 2")
+    mode = f"{WATCHED}keeps mode"
+    for made, other, suffix in ((first, second, " 1"), (second, first, " 2")):
+        unknown = f"{REFUSED}{suffix}: (> level_mm int:50)"
+        assert unknown in values.variables([made.after[mode]])
+        assert unknown not in values.variables([other.after[mode]])
