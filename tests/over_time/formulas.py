@@ -1,7 +1,8 @@
 """Past-time metric temporal logic on finite traces, for many traces at once; shares nothing with rcsc.
 
-In: formulas as text, in FRET's notation: `! & | ->`, `Y` (in the cycle before, false in the first), `Z` (the same, true in the first),
-`O` (once), `H` (always so far), `S` (since), with `[<=n]`, `[<n]`, `[=n]` or `[a,b]` after them, and `FTP`, true in the first cycle.
+In: formulas as text, in FRET's notation: `! & | <-> xor ->`, `Y` (in the cycle before, false in the first), `Z` (the same, true in the
+first), `O` (once), `H` (always so far), `S` (since), with `[<=n]`, `[<n]`, `[=n]` or `[a,b]` after them, and `FTP`, true in the first
+cycle.
 Out: their truth in each cycle. A truth is an int whose bit k belongs to trace k.
 """
 
@@ -12,8 +13,8 @@ from typing import TypeAlias
 Truths: TypeAlias = list[int]
 Formula: TypeAlias = Callable[[Mapping[str, Sequence[int]], int], Truths]
 """From the truths of the names in each cycle, and the bits of all traces."""
-_TOKEN = re.compile(r"\s*(->|[!&|()]|\[[^\]]*\]|\w+)")
-_BINARY = (("->",), ("|",), ("&",), ("S",))
+_TOKEN = re.compile(r"\s*(<->|->|[!&|()]|\[[^\]]*\]|\w+)")
+_BINARY = (("->",), ("<->", "xor"), ("|",), ("&",), ("S",))
 
 
 def parsed(text: str, n: int = 0) -> Formula:
@@ -74,6 +75,8 @@ def _limits(tokens: list[str], n: int) -> tuple[int, int | None]:
 def _joined(word: str, left: Formula, right: Formula) -> Formula:
     def truth(trace: Mapping[str, Sequence[int]], full: int) -> Truths:
         both = zip(left(trace, full), right(trace, full), strict=True)
+        if word in {"<->", "xor"}:
+            return [full * (word == "<->") ^ a ^ b for a, b in both]
         if word == "->":
             return [(full & ~a) | b for a, b in both]
         return [a & b for a, b in both] if word == "&" else [a | b for a, b in both]
