@@ -9,6 +9,7 @@ from typing import TypeVar, assert_never
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.model import (
     BEFORE,
+    WATCHED,
     Among,
     Apply,
     Assign,
@@ -24,6 +25,7 @@ from rcsc.lang.model import (
     Op,
     Procedure,
     Program,
+    Property,
     Read,
     ReadLocal,
     Real,
@@ -102,6 +104,12 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
             yield part.name
         elif isinstance(part, Select):
             yield from part.leaves
+
+
+def spoken_of(stated: Property) -> tuple[VariableName, ...]:
+    """Return the leaves of the level that a property or requirement reads, each once; those of the cycle before as `earlier`."""
+    every = (name for condition in stated.about for name in read_by(condition))
+    return tuple(dict.fromkeys(name for name in every if not name.removeprefix(BEFORE).startswith(WATCHED)))
 
 
 def reads_of(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
@@ -273,8 +281,8 @@ class Uses:
         for invariant in program.invariants:
             self._reads(f"invariant {invariant.name}", "", invariant.condition, invariant.requirements)
         for stated in program.properties:
-            for condition in stated.about:
-                self._reads(f"{stated.word} {stated.name}", "", condition, stated.requirements)
+            leaves = (VariableName(leaf.removeprefix(BEFORE)) for leaf in spoken_of(stated))
+            self._note(self.read, f"{stated.word} {stated.name}", "", leaves, stated.requirements)
 
     def _procedure(self, procedure: Procedure) -> None:
         """Note what a procedure itself reads and writes; of an `extern` one, what it is declared to."""

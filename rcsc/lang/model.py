@@ -645,7 +645,7 @@ class Property:
 
     @property
     def about(self) -> tuple[Expr, ...]:
-        """What it says of the level's own leaves: its condition, or what its monitor looks at."""
+        """Its conditions on the level's leaves: those of a monitor read its states, too (`leaves.spoken_of`)."""
         return (self.condition,) if self.monitor is None else tuple(truth for _, truth in self.monitor.truths)
 
 

@@ -142,7 +142,11 @@ requirement aa : unless a, for 3 cycles, c
 requirement ab : while a, always b
 requirement ac : before a, never b
 requirement ad : after a, when b, within 3 [s], c
-requirement ae : until a, b
+requirement ae : until a, b since once c
+requirement af : at most 2 times in 3 [s], b
+requirement ag : at least 3 cycles apart, b
+requirement ah : on for at least 3 cycles, b
+requirement ai : off for at least 3 [s], b
 procedure f(x : int 0 .. 3) { local y : bool := max(1, 2) = 2 if a { b := 1 }
 else { for i in 0 .. 3 { next c := d } } case a { 1 { b := 2 } } }
 module g reads a writes b { b := count(a) }

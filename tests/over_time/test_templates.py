@@ -9,8 +9,8 @@ import pytest
 
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Bool, Expr, Monitor, Read, VariableName
-from rcsc.lang.over_time import Requirement, Scope, Timing, Trigger, begun, monitored, stepped
-from rcsc.lang.over_time.monitor import FALSE
+from rcsc.lang.over_time import Past, Requirement, Scope, Timing, Trigger, begun, monitored, stepped
+from rcsc.lang.over_time.past import FALSE
 from tests.over_time.formulas import parsed
 
 DATA = Path(__file__).parents[1] / "data"
@@ -45,8 +45,8 @@ def leaf(name: str) -> Expr:
 
 def made(scope: str, trigger: str, timing: str, cycles: int) -> tuple[Monitor, Expr]:
     m, c, s, p = map(leaf, NAMES)
-    required = Requirement(TIMINGS[timing], p, TRIGGERS[trigger], c, SCOPES[scope], m, cycles, s)
-    return monitored("r", required)
+    required = Requirement(TIMINGS[timing], p, TRIGGERS[trigger], c, SCOPES[scope], m, cycles=cycles, stop=s)
+    return monitored(Past("r"), required)
 
 
 def judged(monitor: Monitor, kept: Expr, trace: dict[str, list[bool]]) -> Iterator[bool]:
@@ -152,8 +152,8 @@ def test_from_one_condition_to_another_is_as_while_it_is_so(scope: Scope, timing
     m, c, s, p = map(leaf, NAMES)
     for trigger, how in TRIGGERS.items():
         formula = parsed(TEMPLATES["null", trigger, timing], 2)
-        required = Requirement(TIMINGS[timing], p, how, c, scope, m, 2, s, leaf("e"))
-        monitor, kept = monitored("r", required)
+        required = Requirement(TIMINGS[timing], p, how, c, scope, m, cycles=2, stop=s, end=leaf("e"))
+        monitor, kept = monitored(Past("r"), required)
         assert scope is Scope.FROM or monitor.owes == FALSE
         for length in LENGTHS * 12:
             trace = {**drawn(random, length), "e": drawn(random, length)["m"]}

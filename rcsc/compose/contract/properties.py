@@ -28,6 +28,7 @@ from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     BEFORE,
     COMPARISONS,
+    WATCHED,
     Among,
     Apply,
     Bool,
@@ -36,7 +37,6 @@ from rcsc.lang.model import (
     Int,
     Kind,
     Literal,
-    Monitor,
     Op,
     Program,
     Property,
@@ -50,7 +50,7 @@ from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
 
 MOST_COUNTED = 12
-"""How far the counters of monitors are, as predicates: each number of cycles up to so many, and those that the statements compare."""
+"""How far counters are, as predicates: each number up to so many, besides those that something compares."""
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
@@ -159,21 +159,28 @@ def _stated_conditions(ts: TransitionSystem) -> list[Expr]:
     return [
         *(invariant.condition for invariant in program.invariants),
         *(stated.condition for stated in program.properties),
-        *(condition for _, monitor in monitors(program) for condition in _looked_at(monitor)),
+        *_looked_at(program),
         *(fact.condition for fact in ts.links.owes),
     ]
 
 
-def _looked_at(monitor: Monitor) -> Iterator[Expr]:
-    """Yield what a monitor looks at of the level, what its statements decide, and how far its counters are."""
-    yield from (truth for _, truth in monitor.truths)
-    for statement in everything(monitor.statements):
-        yield from expressions(statement)
-    for state in monitor.states:
-        if isinstance(state.type, Int):
-            for cycles in range(1, min(state.type.high, MOST_COUNTED) + 1):
-                number = Literal(cycles, Int(cycles, cycles))
-                yield Apply(Op.GE, (Read(state.name, state.type), number), Bool())
+def _looked_at(program: Program) -> Iterator[Expr]:
+    """Yield what monitors look at of the level, what their statements decide, and how far their counters are, and small ones of the level.
+
+    A counter of the level and one of a monitor often go up together; so each number of both is told apart.
+    """
+    counters: list[tuple[VariableName, Scalar]] = []
+    for _, monitor in monitors(program):
+        yield from (truth for _, truth in monitor.truths)
+        for statement in everything(monitor.statements):
+            yield from expressions(statement)
+        counters += [(state.name, state.type) for state in monitor.states if isinstance(state.type, Int)]
+    if counters:
+        counters += [(v.name, v.type) for v in program.variables if v.kind is not Kind.INPUT]
+    for name, kind in counters:
+        if isinstance(kind, Int) and (name.startswith(WATCHED) or kind.high - kind.low <= MOST_COUNTED):
+            for value in range(kind.low + 1, min(kind.high, kind.low + MOST_COUNTED) + 1):
+                yield Apply(Op.GE, (Read(name, kind), Literal(value, Int(value, value, kind.unit))), Bool())
 
 
 def _stated_predicates(

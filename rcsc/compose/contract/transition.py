@@ -15,7 +15,7 @@ from rcsc.compose.contract.watched import REFUSED as REFUSED  # noqa: PLC0414  #
 from rcsc.compose.contract.watched import Leaves as Leaves  # noqa: PLC0414  # as above
 from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, monitors
 from rcsc.lang.interpret import chosen_table
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import (  # fmt: skip
     Action,
     Admit,
@@ -231,8 +231,7 @@ class TransitionSystem:
 
     def _looked_back_at(self) -> frozenset[str]:
         """Find the inputs that a property looks back at, which a refused cycle left as they came."""
-        every = (condition for stated in self.program.properties for condition in stated.about)
-        read = {str(name) for condition in every for name in read_by(condition)}
+        read = {str(name) for stated in self.program.properties for name in spoken_of(stated)}
         return frozenset(leaf for leaf in self.inputs if str(earlier(leaf)) in read)
 
     def _of_outside(self) -> Iterator[Variable]:

@@ -155,9 +155,10 @@ def ghosts_after(program: Program, before: Leaves, after: Leaves, refusals: Refu
     for _, monitor in monitors(program):
         run = Run({}, {}, {**after, **was})
         defined = TRUE
+        now = {**after, **was}
         for name, truth in monitor.truths:
-            holds, sound = judged(truth, {**after, **was}, refusals)
-            run.state.leaves[str(name)] = values.both(sound, holds)
+            holds, sound = judged(truth, now, refusals)
+            now[str(name)] = run.state.leaves[str(name)] = values.both(sound, holds)
             defined = values.both(defined, sound)
         run.state.leaves[str(monitor.defined)] = defined
         run.execute(monitor.statements)

@@ -46,6 +46,7 @@ from rcsc.lang.model import (
     Variable,
     VariableName,
 )
+from rcsc.lang.over_time.past import looks_back as looks_back_twice
 from rcsc.lang.restart import Adopted, After, SameAs, Stands
 
 KEEP = "keep_previous"
@@ -54,6 +55,16 @@ KEEP = "keep_previous"
 
 def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
     """Return the expression over the values after the cycle before; None after an error."""
+    if scope.past is not None and looks_back_twice(read_by(now)):
+        if isinstance(now.type, Bool):
+            return scope.past.before(now)
+        scope.report(
+            Code.NO_CYCLE_BEFORE,
+            "`was` goes back one cycle, not two",
+            span,
+            "a condition may: `was (x > was y)`",
+        )
+        return None
     if scope.in_property:
         return one_earlier(now)
     if next(read_by(now), None) is None:
@@ -130,6 +141,8 @@ def lasting(scope: Scope, condition: Expr, text: str, cycles: int, span: Span) -
         message = "`for` is about a variable; a constant, a local or a parameter has not held for a time"
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
         return None
+    if scope.past is not None:
+        return scope.past.lasting(condition, cycles)
     local = next((part for part in parts(condition) if isinstance(part, ReadLocal)), None)
     if local is not None:
         message = f"`{local.name}` is known in its procedure alone: what has to hold for a time is counted where each cycle ends"

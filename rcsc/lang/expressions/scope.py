@@ -25,6 +25,7 @@ from rcsc.lang.model import (
     VariableName,
     unit_text,
 )
+from rcsc.lang.over_time.past import Past
 from rcsc.lang.restart import COMMAND, ECHO, NUMBER, SEEN, STATUS
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import BITS, CALL_UNDER, ONE_GROUP, Cell
@@ -83,6 +84,7 @@ class Scope:
         periods: The periods of the program's levels in ms, each once; None before they are known.
         untimed: Why `for` cannot stand in the table that is being resolved; empty where it can.
         in_property: Whether a property is being resolved, which has both cycles before it and needs no hidden state.
+        past: The states of the requirement over time that is being resolved, whose conditions may look back anywhere; None elsewhere.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
         least_first: Whether what has no initial value starts with the least of its type, as in files from before 0 was it.
     """
@@ -121,6 +123,7 @@ class Scope:
     periods: tuple[int, ...] | None = None
     untimed: str = ""
     in_property: bool = False
+    past: Past | None = None
     no_before: str = ""
     least_first: bool = False
 

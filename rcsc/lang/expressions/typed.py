@@ -1,7 +1,7 @@
 """Expressions: names found, sub-expressions typed, paths followed to their leaves."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TypeAlias
@@ -89,7 +89,7 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _bits_of(scope, body, written)
         case tree.Unary():
             return _unary(scope, body, written)
-        case tree.Was() | tree.Event() | tree.Lasts():
+        case tree.Was() | tree.Event() | tree.Lasts() | tree.Once() | tree.Since():
             return _of_cycles(scope, body, written, want)
         case tree.Binary():
             return _binary(scope, body, written)
@@ -107,15 +107,22 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
 
 
 def _of_cycles(
-    scope: Scope, body: Body, written: tree.Was | tree.Event | tree.Lasts, want: Scalar | None
+    scope: Scope,
+    body: Body,
+    written: tree.Was | tree.Event | tree.Lasts | tree.Once | tree.Since,
+    want: Scalar | None,
 ) -> Typed | None:
     match written:
+        case tree.Once(operand, span):
+            return _since(scope, body, "once", (operand,), span)
+        case tree.Since(left, right, span):
+            return _since(scope, body, "since", (left, right), span)
         case tree.Was(operand, span):
             return _was(scope, body, operand, span, want)
         case tree.Event():
             return _event(scope, body, written)
         case tree.Lasts(condition, time, span):
-            with without_before(scope, AT_ONCE):
+            with _nested(scope, AT_ONCE):
                 holding = boolean(scope, body, condition)
             text = spell_expr(condition)
             return None if holding is None else for_a_time(scope, body, holding, text, time, span)
@@ -380,10 +387,33 @@ def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar 
     if scope.no_before:
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
         return None
-    with without_before(scope, "`was` goes back one cycle, not two"):
+    with _nested(scope, "`was` goes back one cycle, not two"):
         operand = typed(scope, body, written, want)
     past = None if operand is None else before(scope, operand.expr, span)
     return None if operand is None or past is None else Typed(past, operand.bare)
+
+
+def _since(scope: Scope, body: Body, word: str, operands: tuple[tree.Expr, ...], span: Span) -> Typed | None:
+    """Resolve `once a`, or `a since b`, which a requirement over time remembers."""
+    if scope.past is None or scope.no_before:
+        message = (
+            scope.no_before.replace("`was`", f"`{word}`") or f"`{word}` stands in requirements over time"
+        )
+        scope.report(Code.NO_CYCLE_BEFORE, message, span)
+        return None
+    conditions = [boolean(scope, body, operand) for operand in operands]
+    match [condition for condition in conditions if condition is not None]:
+        case [condition] if len(operands) == 1:
+            return Typed(scope.past.once(condition))
+        case [kept, begun]:
+            return Typed(scope.past.since(kept, begun))
+        case _:
+            return None
+
+
+def _nested(scope: Scope, why: str) -> AbstractContextManager[None]:
+    """Refuse `was`, inside, for the reason given; not in a requirement over time, which remembers all that it needs."""
+    return nullcontext() if scope.past is not None else without_before(scope, why)
 
 
 def for_a_time(
@@ -439,7 +469,7 @@ def happening(
         message = scope.no_before.replace("`was`", "an event")
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
         return None
-    with without_before(scope, OF_TWO_CYCLES):
+    with _nested(scope, OF_TWO_CYCLES):
         now = operand()
         guard = None if written.guard is None else boolean(scope, body, written.guard)
     past = None if now is None else before(scope, now.expr, span)

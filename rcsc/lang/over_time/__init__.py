@@ -6,9 +6,9 @@ once, keeps a few truth values and bounded counters, and tells in which cycle th
 that is said of time is a condition on one cycle and these states, so that whoever proves a property, or watches one, does it as ever.
 
 >>> from rcsc.lang.model import Bool, Read, VariableName
->>> from rcsc.lang.over_time import Requirement, Timing, Trigger, begun, monitored, stepped
+>>> from rcsc.lang.over_time import Past, Requirement, Timing, Trigger, begun, monitored, stepped
 >>> asked, given = (Read(VariableName(name), Bool()) for name in ("asked", "given"))
->>> monitor, kept = monitored("answered", Requirement(Timing.WITHIN, given, Trigger.WHEN, asked, cycles=2))
+>>> monitor, kept = monitored(Past("answered"), Requirement(Timing.WITHIN, given, Trigger.WHEN, asked, cycles=2))
 >>> state = begun(monitor)
 >>> for cycle in ({"asked": True, "given": False}, {"asked": False, "given": False}, {"asked": False, "given": False}):
 ...     state, good = stepped(monitor, kept, state, {}, cycle)
@@ -23,11 +23,13 @@ requirements*, Information and Software Technology 137 (2021). Each monitor is h
 Trusted: all of it, for what a requirement means. Cost: a monitor has at most six states besides the truths that it looks at, but for
 *exactly after* in an `only` scope, which has one for each cycle of its time.
 
-Modules, in the order the data flows: `requirement` (what is said), `monitor` (its states and statements), `run` (a monitor over a run).
+Modules, in the order the data flows: `past` (what conditions remember), `requirement` (what is said), `monitor` (its states and
+statements), `run` (a monitor over a run).
 """
 
 from rcsc.lang.over_time.monitor import monitored
+from rcsc.lang.over_time.past import Past
 from rcsc.lang.over_time.requirement import Requirement, Scope, Timing, Trigger
 from rcsc.lang.over_time.run import Watch, begun, stepped
 
-__all__ = ["Requirement", "Scope", "Timing", "Trigger", "Watch", "begun", "monitored", "stepped"]
+__all__ = ["Past", "Requirement", "Scope", "Timing", "Trigger", "Watch", "begun", "monitored", "stepped"]

@@ -11,33 +11,18 @@ Source of the meaning: the interval semantics of FRET, as its manual and its for
 (https://github.com/NASA-SW-VnV/fret, release 3.1, `fret-electron/app/parser/semantics.json`).
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from functools import reduce
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
 
-from rcsc.lang.model import (
-    WATCHED,
-    Apply,
-    Assign,
-    Bool,
-    Expr,
-    Hidden,
-    If,
-    Int,
-    Literal,
-    Monitor,
-    Op,
-    Read,
-    Scalar,
-    Statement,
-    ToLeaf,
-    Value,
-    VariableName,
-    earlier,
-)
-from rcsc.lang.over_time.requirement import STOPPED, TRUE, Requirement, Scope, Timing, Trigger
+from rcsc.lang.model import Bool, Expr, If, Int, Monitor, Statement
+from rcsc.lang.over_time.past import FALSE, TRUE, Past, State, both, either, negation, number
+from rcsc.lang.over_time.requirement import STOPPED, Requirement, Scope, Timing, Trigger
 
-FALSE = Literal(value=False, type=Bool())
+MOST_CYCLES = 2**32 - 1
+"""The longest time."""
+MOST_TIMES = 16
+"""How often something may be allowed in a time: each needs a counter of its own."""
 MOST_REMEMBERED = 64
 """The most cycles of *exactly after* in an `only` scope under a trigger: each needs a state of its own."""
 
@@ -54,12 +39,13 @@ _DUAL = {
 }
 
 
-def monitored(name: str, required: Requirement) -> tuple[Monitor, Expr]:
-    """Return the monitor of the requirement called so, and the condition that a cycle keeps it.
+def monitored(past: Past, required: Requirement) -> tuple[Monitor, Expr]:
+    """Return the monitor of a requirement, and the condition that a cycle keeps it.
 
-    The condition reads the monitor's states alone: as the cycle leaves them, and as it finds them (`earlier`).
+    The condition reads the monitor's states alone: as the cycle leaves them, and as it finds them (`earlier`). `past` has the states
+    that the requirement's own conditions need.
     """
-    made = _Made(name)
+    made = _Made(past.name, list(past.states), list(past.truths), list(past.statements))
     defined = made.state("defined", Bool(), initial=True)
     in_scope = made.scope(required)
     asks = made.trigger(required, in_scope)
@@ -70,76 +56,7 @@ def monitored(name: str, required: Requirement) -> tuple[Monitor, Expr]:
     return monitor, both(defined.now, negation(broken))
 
 
-# --- conditions ------------------------------------------------------------------------------
-
-
-def negation(term: Expr) -> Expr:
-    """Return the negation; of a constant, a constant."""
-    if isinstance(term, Literal):
-        return Literal(value=not term.value, type=Bool())
-    if isinstance(term, Apply) and term.op is Op.NOT:
-        return term.args[0]
-    return Apply(Op.NOT, (term,), Bool())
-
-
-def both(*terms: Expr) -> Expr:
-    """Return the conjunction, without constants."""
-    return _joined(Op.AND, TRUE, FALSE, terms)
-
-
-def either(*terms: Expr) -> Expr:
-    """Return the disjunction, without constants."""
-    return _joined(Op.OR, FALSE, TRUE, terms)
-
-
-def _joined(op: Op, neutral: Literal, deciding: Literal, terms: Iterable[Expr]) -> Expr:
-    left = [term for term in terms if term != neutral]
-    if deciding in left:
-        return deciding
-    return reduce(lambda first, other: Apply(op, (first, other), Bool()), left) if left else neutral
-
-
-def number(value: int) -> Expr:
-    """Return a constant."""
-    return Literal(value, Int(value, value))
-
-
 # --- a monitor in the making -----------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class _State:
-    """A state: as the cycle finds it, `was`, and as it leaves it, `now`."""
-
-    name: VariableName
-    type: Scalar
-
-    @property
-    def now(self) -> Expr:
-        return Read(self.name, self.type)
-
-    @property
-    def was(self) -> Expr:
-        return Read(earlier(self.name), self.type)
-
-    def was_from(self, low: int, high: int) -> Expr:
-        """Return the condition that the cycle finds it between two numbers."""
-        assert isinstance(self.type, Int)
-        least = TRUE if low <= self.type.low else _compared(Op.GE, self.was, low)
-        return both(least, TRUE if high >= self.type.high else _compared(Op.LE, self.was, high))
-
-    def set(self, value: Expr) -> Statement:
-        return Assign(ToLeaf(self.name, self.type), value)
-
-    def counted(self, by: int) -> Statement:
-        """Return the statement that counts it up or down, from what the cycle finds."""
-        assert isinstance(self.type, Int)
-        op, low, high = (Op.ADD, 1, self.type.high + 1) if by > 0 else (Op.SUB, -1, self.type.high - 1)
-        return self.set(Apply(op, (self.was, number(1)), Int(low, high)))
-
-
-def _compared(op: Op, left: Expr, right: int) -> Expr:
-    return Apply(op, (left, number(right)), Bool())
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,27 +69,14 @@ class _InScope:
 
 
 @dataclass(slots=True)
-class _Made:
-    """A monitor in the making."""
+class _Made(Past):
+    """A monitor in the making, of which the states are there that the conditions need."""
 
-    name: str
-    states: list[Hidden] = field(default_factory=list)
-    truths: list[tuple[VariableName, Expr]] = field(default_factory=list)
-    statements: list[Statement] = field(default_factory=list)
+    def stored(self, part: str, condition: Expr) -> State:
+        """Add the state that takes the truth of a condition of the requirement."""
+        return self.truth(part, lambda _: condition)
 
-    def state(self, part: str, kind: Scalar, initial: Value) -> _State:
-        """Add a state."""
-        made = _State(VariableName(f"{WATCHED}{self.name} {part}"), kind)
-        self.states.append(Hidden(made.name, kind, initial))
-        return made
-
-    def truth(self, part: str, condition: Expr) -> _State:
-        """Add the state that takes the truth of a condition on the level."""
-        made = self.state(part, Bool(), initial=False)
-        self.truths.append((made.name, condition))
-        return made
-
-    def flag(self, part: str, value: Callable[[_State], Expr]) -> _State:
+    def flag(self, part: str, value: Callable[[State], Expr]) -> State:
         """Add a truth value, and its value after each cycle."""
         made = self.state(part, Bool(), initial=False)
         self.statements.append(made.set(value(made)))
@@ -187,11 +91,11 @@ class _Made:
         inside = self._scope(required)
         return _InScope(inside.now, inside.was, both(inside.was, negation(inside.now)))
 
-    def _scope(self, required: Requirement) -> _State:
-        mode = self.truth("mode", required.mode).now
+    def _scope(self, required: Requirement) -> State:
+        mode = self.stored("mode", required.mode).now
         scope = required.scope
         if scope in {Scope.BETWEEN, Scope.FROM}:
-            end = self.truth("end", required.end).now
+            end = self.stored("end", required.end).now
             return self.flag("inside", lambda inside: both(negation(end), either(mode, inside.was)))
         if scope is Scope.WHILE:
             return self.flag("inside", lambda _: mode)
@@ -214,7 +118,7 @@ class _Made:
         """Add what tells whether a cycle asks for the response; return that it does."""
         if required.trigger is Trigger.FIRST:
             return both(scope.inside, negation(scope.was_inside))
-        condition = self.truth("condition", required.condition)
+        condition = self.stored("condition", required.condition)
         asks = both(scope.inside, condition.now)
         if required.trigger is Trigger.WHENEVER:
             return asks
@@ -224,17 +128,19 @@ class _Made:
 
     def timing(self, required: Requirement, scope: _InScope, asks: Expr) -> tuple[Expr, Expr]:
         """Add what the timing remembers; return the conditions that the cycle breaks the requirement, and that it is owed."""
-        response = self.truth("response", required.response).now
+        timing, cycles = required.timing, required.cycles
+        if timing is Timing.AT_MOST:
+            return self._at_most(required, scope), FALSE
+        response = self.stored("response", required.response).now
         question = self.flag("asked", lambda _: asks)
         asked = question.now
-        timing, cycles = required.timing, required.cycles
         if required.scope.only and timing is Timing.EXACTLY_AFTER:
             return self._not_exactly_after(required, scope, asked, response)
         if timing is Timing.NEVER:
             timing, response = Timing.ALWAYS, negation(response)
         if required.scope.only:
             timing, response = _DUAL[timing], negation(response)
-        stop = self.truth("stop", required.stop).now if timing in STOPPED else FALSE
+        stop = self.stored("stop", required.stop).now if timing in STOPPED else FALSE
         match timing:
             case Timing.AT_ONCE:
                 return both(asked, negation(response)), FALSE
@@ -295,6 +201,26 @@ class _Made:
         early = both(response, either(asked, forbids))
         return either(early, both(due, either(negation(response), again.was)))
 
+    def _at_most(self, required: Requirement, scope: _InScope) -> Expr:
+        """Count down from each of the last beginnings: none of so many is to be within the time of another."""
+        response = self.stored("response", required.response)
+        begins = both(scope.inside, response.now, negation(both(scope.was_inside, response.was)))
+        begun = self.flag("begun", lambda _: begins).now
+        left = [
+            self.state(f"left {at}", Int(0, required.cycles - 1), 0) for at in range(1, required.times + 1)
+        ]
+        rests = [self._counted_down(scope, state, state) for state in left]
+        moves = [self._counted_down(scope, before, after) for before, after in pairwise(left)]
+        first = left[0].set(number(required.cycles - 1))
+        self.statements.append(If(begun, (*moves[::-1], first), tuple(rests)))
+        return both(begun, left[-1].was_from(1, required.cycles))
+
+    @staticmethod
+    def _counted_down(scope: _InScope, before: State, after: State) -> Statement:
+        """Return the statement that gives one state what is left of another, one cycle later."""
+        lasts = both(scope.inside, before.was_from(1, MOST_CYCLES))
+        return If(lasts, (after.set(before.one_more(-1)),), (after.set(number(0)),))
+
     def _before(self, scope: _InScope, asked: Expr, response: Expr, stop: Expr) -> Expr:
         """Remember that a question is open: the stop is not to come then, nor in the cycle of the response."""
         before = self.state("open", Bool(), initial=False)
@@ -319,6 +245,6 @@ class _Made:
             last = self._next(f"asked {at}", last, quiet)
         return both(scope.inside, response, last.was), FALSE
 
-    def _next(self, part: str, before: _State, quiet: Expr) -> _State:
+    def _next(self, part: str, before: State, quiet: Expr) -> State:
         """Add a flag that is what another one was in the cycle before, if that is still of interest."""
         return self.flag(part, lambda _: both(quiet, before.was))

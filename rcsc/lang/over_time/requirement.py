@@ -6,9 +6,8 @@ In: nothing. Out: the frozen `Requirement` that `resolve` makes of a declaration
 from dataclasses import dataclass
 from enum import StrEnum
 
-from rcsc.lang.model import Bool, Expr, Literal
-
-TRUE = Literal(value=True, type=Bool())
+from rcsc.lang.model import Expr
+from rcsc.lang.over_time.past import TRUE
 
 
 class Scope(StrEnum):
@@ -65,10 +64,10 @@ class Timing(StrEnum):
     EXACTLY_AFTER = "exactly after"
     UNTIL = "until"
     BEFORE = "before"
+    AT_MOST = "at most"
+    """Of each row of so many cycles, at most some in which the response begins to hold; no cycle asks for it."""
 
 
-TIMED = frozenset({Timing.WITHIN, Timing.FOR, Timing.EXACTLY_AFTER})
-"""Timings that have a number of cycles."""
 STOPPED = frozenset({Timing.UNTIL, Timing.BEFORE})
 """Timings that have a condition which ends them."""
 
@@ -82,6 +81,7 @@ class Requirement:
         condition: Of the trigger; any for `FIRST`.
         mode: Of the scope; any for `ALL`. `end`: of a scope that has one, the condition that ends it.
         cycles: The time of the timing, in cycles from the one that asks; 0 where it has none.
+        times: Of `AT_MOST`, how often.
         stop: The condition that ends the timing; any where it has none.
     """
 
@@ -92,5 +92,6 @@ class Requirement:
     scope: Scope = Scope.ALL
     mode: Expr = TRUE
     cycles: int = 0
+    times: int = 0
     stop: Expr = TRUE
     end: Expr = TRUE

@@ -8,13 +8,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.lang.expressions.previous import MOST_CYCLES, cycles_of
+from rcsc.lang.expressions.previous import cycles_of
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before
 from rcsc.lang.expressions.types import constant
 from rcsc.lang.leaves import one_earlier, read_by
 from rcsc.lang.model import Apply, Bool, Expr, Int, Op, Property
-from rcsc.lang.over_time import monitor, requirement
+from rcsc.lang.over_time import monitor, past, requirement
 from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr, spell_required
@@ -137,38 +137,63 @@ def _apply(op: Op, left: Expr, right: Expr) -> Expr:
 # --- requirements over time ----------------------------------------------------------
 
 
+_AS_OTHERS = {
+    "only after": requirement.Timing.UNTIL,
+    "at least": requirement.Timing.AT_MOST,
+    "on": requirement.Timing.FOR,
+    "off": requirement.Timing.FOR,
+}
+"""Timings that others say: P `only after` Q is not P until Q; what begins `at least` so long `apart` begins at most once in that time;
+`on for at least` T is, when P, P for a cycle less than T: the cycles in which it is on last that long."""
+
+
 def _requirement(scope: Scope, written: tree.RequirementDecl) -> Property | None:
     """Resolve a requirement over time; None after an error."""
+    scope.past = past.Past(written.name.text)
+    required, remembered = _required(scope, written), scope.past
+    scope.past = None
+    if required is None or not _remembers(scope, written, required):
+        return None
+    watch, kept = monitor.monitored(remembered, required)
+    if watch.owes != past.FALSE:
+        _without_bound(scope, written)
+        return None
+    name, doc, text = written.name, " ".join(written.doc), spell_required(written)
+    named = requirements(scope, written.requirements)
+    return Property(name.text, kept, text, doc, name.span, requirements=named, monitor=watch)
+
+
+def _required(scope: Scope, written: tree.RequirementDecl) -> requirement.Requirement | None:
+    """Resolve what a requirement says."""
     conditions = {"response": written.response, "mode": written.mode, "condition": written.condition, "stop": written.stop,
                   "end": written.end}  # fmt: skip
     resolved = {part: _condition(scope, one, "") for part, one in conditions.items() if one is not None}
     cycles = 0 if written.time is None else _cycles(scope, written.time)
-    if cycles is None or None in resolved.values():
+    times = 1 if written.times is None else _times(scope, written.times)
+    if cycles is None or times is None or None in resolved.values():
         return None
-    required = requirement.Requirement(
-        requirement.Timing(written.timing),
-        trigger=requirement.Trigger(written.trigger),
-        scope=requirement.Scope(written.scope),
-        cycles=cycles,
-        **{part: one for part, one in resolved.items() if one is not None},
-    )
-    if not _remembers(scope, written, required):
+    said = {part: one for part, one in resolved.items() if one is not None}
+    trigger = requirement.Trigger(written.trigger)
+    if written.timing in {"off", "only after"}:
+        said["response"] = past.negation(said["response"])
+    if written.timing in {"on", "off"}:
+        said["condition"], trigger, cycles = said["response"], requirement.Trigger.WHEN, cycles - 1
+    timing = _AS_OTHERS.get(written.timing) or requirement.Timing(written.timing)
+    scope_ = requirement.Scope(written.scope)
+    return requirement.Requirement(timing, trigger=trigger, scope=scope_, cycles=cycles, times=times, **said)
+
+
+def _times(scope: Scope, written: tree.Expr) -> int | None:
+    """Return how often something may begin; None (reported) where it is no such number."""
+    value = constant(scope, written)
+    if value is None:
         return None
-    name = written.name.text
-    watch, kept = monitor.monitored(name, required)
-    if watch.owes != monitor.FALSE:
-        _without_bound(scope, written)
+    times = value.literal().value
+    if value.unit() or not isinstance(value.expr.type, Int) or not 1 <= times <= monitor.MOST_TIMES:
+        message = f"`{spell_expr(written)}` is no number of times from 1 to {monitor.MOST_TIMES}"
+        scope.report(Code.NO_CYCLES, message, written.span)
         return None
-    named = requirements(scope, written.requirements)
-    return Property(
-        name,
-        kept,
-        spell_required(written),
-        " ".join(written.doc),
-        written.name.span,
-        requirements=named,
-        monitor=watch,
-    )
+    return int(times)
 
 
 def _cycles(scope: Scope, written: tree.Time) -> int | None:
@@ -179,8 +204,10 @@ def _cycles(scope: Scope, written: tree.Time) -> int | None:
     time = value.literal().value
     if not written.cycles:
         return cycles_of(scope, time, value.unit(), written.span)
-    if value.unit() or not isinstance(value.expr.type, Int) or not 1 <= time <= MOST_CYCLES:
-        message = f"`{spell_expr(written.value)} cycles` is no number of cycles from 1 to {MOST_CYCLES}"
+    if value.unit() or not isinstance(value.expr.type, Int) or not 1 <= time <= monitor.MOST_CYCLES:
+        message = (
+            f"`{spell_expr(written.value)} cycles` is no number of cycles from 1 to {monitor.MOST_CYCLES}"
+        )
         scope.report(Code.NO_CYCLES, message, written.span, "the cycle that asks is `at once`")
         return None
     return int(time)

@@ -199,7 +199,8 @@ class Build:
         name, *parts, response = (part for part in node.children if self._rule(part) != "req")
         scope, asks, takes = (self._worded(parts, before) for before in ("in_", "asks_", "takes_"))
         mode, *end = scope[1]
-        time = takes[1][0] if isinstance(takes[1][0], tree.Time) else None
+        *other, last = takes[1]
+        time = last if isinstance(last, tree.Time) else None
         return tree.RequirementDecl(
             self._name(name),
             scope[0],
@@ -209,8 +210,9 @@ class Build:
             takes[0],
             self.expr(response),
             time,
-            None if time is not None else takes[1][0],
+            None if time is not None else last,
             end[0] if end else None,
+            other[0] if other else None,
             **head,
         )
 
@@ -219,7 +221,7 @@ class Build:
         part = next((part for part in parts if self._rule(part).startswith(before)), None)
         if part is None:
             return "", [None]
-        inside = [child for child in part.children if getattr(child, "type", "") != "WHEN"]
+        inside = [child for child in part.children if not hasattr(child, "type")]
         times = ("lasting_time", "cycles_time")
         stands = [self._time(child) if self._rule(child) in times else self.expr(child) for child in inside]
         return self._rule(part).removeprefix(before).replace("_", " "), stands or [None]
@@ -418,6 +420,12 @@ class Build:
 
     def _was(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.Was(self.expr(parts[0]), span)
+
+    def _once(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Once(self.expr(parts[-1]), span)
+
+    def _since(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Since(self.expr(parts[0]), self.expr(parts[-1]), span)
 
     def _event(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.Event(self._name(parts[0]), self.expr(parts[1]), None, span)

@@ -9,8 +9,8 @@ _DECLARATION = frozenset(
     "USE UNIT CONST ENUM TYPE RECORD LINK SERVES COMMANDS ADOPT KIND ASSUME INVARIANT PROPERTY REQUIREMENT PROCEDURE MODULE _SET".split()
     + "EXTERN OWNER TABLE LEVEL".split()
 )
-_EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS EVENT".split())
-_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB HELD".split()) | {op.upper() for op in LOGIC}
+_EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS ONCE EVENT".split())
+_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB HELD SINCE".split()) | {op.upper() for op in LOGIC}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
 _WORDS = {
@@ -44,6 +44,7 @@ _WORDS = {
     "_BECOMES": "`:=`",
     "GROUPS": "bits",
     "HELD": "`for`",
+    "AT_ONCE": "`once`",
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",

@@ -30,7 +30,7 @@ def spell_req(declaration: tree.Required) -> str:
 
 
 _AFTER_A_SCOPE = frozenset(
-    "when whenever at next always never eventually within for exactly until before".split()
+    "when whenever at on off only next always never eventually within for exactly until before".split()
 )
 """Words that would make a scope of `before c,`; a response that begins with a variable called so stands in parentheses."""
 
@@ -38,7 +38,10 @@ _AFTER_A_SCOPE = frozenset(
 def spell_required(one: tree.RequirementDecl) -> str:
     """Return what a requirement says: scope, trigger, timing and response."""
     response = spell_expr(one.response)
-    if one.timing == "before" and response.partition(" ")[0].partition(".")[0] in _AFTER_A_SCOPE:
+    if (
+        one.timing in {"before", "only after"}
+        and response.partition(" ")[0].partition(".")[0] in _AFTER_A_SCOPE
+    ):
         response = f"({response})"
     return "".join((*_in_scope(one), *_asks(one), *_takes(one), response))
 
@@ -57,9 +60,17 @@ def _asks(one: tree.RequirementDecl) -> Iterator[str]:
 
 
 def _takes(one: tree.RequirementDecl) -> Iterator[str]:
-    yield f"{one.timing} "
-    if one.time is not None:
-        yield f"{spell_expr(one.time.value, SUM)}{' cycles' if one.time.cycles else ''}, "
+    time = "" if one.time is None else spell_expr(one.time.value, SUM) + " cycles" * one.time.cycles
+    match one.timing:
+        case "at most":
+            assert one.times is not None
+            yield f"at most {spell_expr(one.times, SUM)} times in {time}, "
+        case "at least":
+            yield f"at least {time} apart, "
+        case "on" | "off":
+            yield f"{one.timing} for at least {time}, "
+        case _:
+            yield f"{one.timing} {time}{', ' if time else ''}"
     if one.stop is not None:
         yield f"{spell_expr(one.stop)}, "
 
@@ -79,6 +90,10 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
             return _place(expr), POSTFIX
         case tree.Unary("not", operand):
             return f"not {spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))}", NEGATION
+        case tree.Once(operand):
+            return f"once {spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))}", NEGATION
+        case tree.Since(left, right):
+            return f"{spell_expr(left, NEGATION)} since {spell_expr(right, NEGATION)}", CONJUNCTION
         case tree.Unary(_, operand):
             return f"-{spell_expr(operand, SIGN)}", SIGN
         case tree.Was() | tree.Event():

@@ -179,6 +179,23 @@ class Lasts:
 
 
 @dataclass(frozen=True, slots=True)
+class Once:
+    """`once a`: a holds, or has held in a cycle before."""
+
+    operand: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """`a since b`: b holds, or has held, and a holds in each cycle after that."""
+
+    left: "Expr"
+    right: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class Binary:
     """`op` is the word of an operator of two operands (`operator_table`)."""
 
@@ -266,6 +283,8 @@ Expr: TypeAlias = (
     | Was
     | Event
     | Lasts
+    | Once
+    | Since
     | Binary
     | InSet
     | InRange
@@ -709,7 +728,8 @@ class RequirementDecl(Required):
     Attributes:
         scope: The words of the scope; "" for none. `mode` is its condition, and `end` that of its end, where it has one.
         trigger: "", "when" or "whenever"; `condition` stands after it.
-        timing: The words of the timing; `time` or `stop` stands after them where they need one.
+        timing: The words of the timing, "at most" and "at least" without those after the time, "on" and "off"; `time`, `stop` or `times`
+            stand after them where they need one.
         response: What has to hold.
     """
 
@@ -723,6 +743,7 @@ class RequirementDecl(Required):
     time: Time | None = None
     stop: Expr | None = None
     end: Expr | None = None
+    times: Expr | None = None
 
 
 @dataclass(frozen=True, slots=True)

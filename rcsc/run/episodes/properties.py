@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rcsc.lang import model
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import read_by, spoken_of
 from rcsc.lang.model import BEFORE, Value
 from rcsc.lang.over_time import Watch
 from rcsc.run.episodes.cycle import Broken, Cycle, Property
@@ -185,7 +185,7 @@ def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
 
 
 def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty | LevelRequirement:
-    reads = list(dict.fromkeys(str(name) for condition in stated.about for name in read_by(condition)))
+    reads = list(map(str, spoken_of(stated)))
     if stated.monitor is not None:
         names = dict.fromkeys(name.removeprefix(BEFORE) for name in reads)
         return LevelRequirement(level, Watch(stated), {name: sign.index[name] for name in names})

@@ -14,7 +14,7 @@ from rcsc.code.emit.rendering import Piece, Rendered
 from rcsc.code.testing.coverage.choose import TakenLine, taken
 from rcsc.code.testing.coverage.document import VectorSet
 from rcsc.code.testing.inputs.condition_text import words
-from rcsc.lang.leaves import everything, read_by, written_by
+from rcsc.lang.leaves import everything, spoken_of, written_by
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import (
     BEFORE,
@@ -262,7 +262,7 @@ class _Build:
         self.program: Program = plan.program
         self.procedures: dict[str, Procedure] = {str(one.name): one for one in self.program.procedures}
         self.spoken = {
-            one.name: {leaf.removeprefix(BEFORE) for condition in one.about for leaf in read_by(condition)}
+            one.name: {leaf.removeprefix(BEFORE) for leaf in spoken_of(one)}
             for one in self.program.properties
         }
 

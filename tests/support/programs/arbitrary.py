@@ -55,6 +55,8 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
     return st.one_of(
         st.builds(tree.Unary, st.sampled_from(["not", "-"]), inner),
         st.builds(tree.Was, inner),
+        st.builds(tree.Once, inner),
+        st.builds(tree.Since, inner, inner),
         st.builds(tree.Binary, BINARY, inner, inner),
         st.builds(tree.InSet, inner, _members(inner), negated=st.booleans()),
         st.builds(tree.InRange, inner, inner, inner, negated=st.booleans()),
@@ -363,7 +365,28 @@ def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
         st.builds(tree.PropertyDecl, NAMES, expressions(), **_REQUIRED),
         st.builds(tree.PropertyDecl, NAMES, expressions(), words, expressions(), **_REQUIRED),
         _requirements(),
+        _counted(),
     )
+
+
+def _counted() -> SearchStrategy[tree.Declaration]:
+    """Draw a requirement that counts, or says for how long."""
+    time = st.builds(tree.Time, expressions(), st.booleans())
+
+    def built(timing: str) -> SearchStrategy[tree.Declaration]:
+        times = expressions() if timing == "at most" else st.none()
+        none, mode = st.none(), expressions()
+        scoped = st.builds(
+            tree.RequirementDecl, NAMES, st.just("while"), mode, st.just(""), none, st.just(timing), expressions(), time,
+            times=times, **_REQUIRED,
+        )  # fmt: skip
+        bare = st.builds(
+            tree.RequirementDecl, NAMES, st.just(""), none, st.just(""), none, st.just(timing), expressions(), time,
+            times=times, **_REQUIRED,
+        )  # fmt: skip
+        return scoped | bare
+
+    return st.sampled_from(("at most", "at least", "on", "off")).flatmap(built)
 
 
 def _requirements() -> SearchStrategy[tree.Declaration]:
@@ -373,7 +396,7 @@ def _requirements() -> SearchStrategy[tree.Declaration]:
         ("between", "from"),
     )
     plain = ("at once", "next", "always", "never", "eventually", "at last")
-    timed, stopped = ("within", "for", "exactly after"), ("until", "before")
+    timed, stopped = ("within", "for", "exactly after"), ("until", "before", "only after")
     none, times = st.none(), st.builds(tree.Time, expressions(), st.booleans())
 
     def built(scope: str, trigger: str, timing: str) -> SearchStrategy[tree.Declaration]:

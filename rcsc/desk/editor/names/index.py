@@ -102,7 +102,9 @@ class _Walk:
                 yield from self.exprs((condition, node.other))
             case tree.RequirementDecl(name):
                 yield self.name(Space.CLAIM, name, node)
-                yield from self.exprs((node.mode, node.end, node.condition, node.stop, node.response))
+                yield from self.exprs(
+                    (node.mode, node.end, node.condition, node.stop, node.times, node.response)
+                )
                 yield from self.exprs(() if node.time is None else (node.time.value,))
             case tree.ProcedureDecl():
                 yield from self.procedure(node)
@@ -388,11 +390,13 @@ class _Walk:
 def _operands(expr: tree.Expr) -> tuple[tree.Expr | None, ...]:
     """Return the operands of an expression that has no names of its own."""
     match expr:
-        case tree.IndexOf(first, second) | tree.Binary(_, first, second) | tree.Lasts(first, second):
+        case tree.IndexOf(first, second) | tree.Binary(_, first, second):
+            return first, second
+        case tree.Lasts(first, second) | tree.Since(first, second):
             return first, second
         case tree.BitsOf(first, second, third) | tree.InRange(first, second, third):
             return first, second, third
-        case tree.Unary(_, operand) | tree.Was(operand):
+        case tree.Unary(_, operand) | tree.Was(operand) | tree.Once(operand):
             return (operand,)
         case tree.Event(_, operand, guard):
             return operand, guard

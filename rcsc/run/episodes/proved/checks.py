@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import read_by, spoken_of
 from rcsc.lang.model import Value, pending
 from rcsc.lang.over_time import Watch
 from rcsc.lang.restart import NUMBERS
@@ -116,7 +116,7 @@ def _owed(claim: Claim, reader: Reader, _: ProvedLevel) -> Check:
 
 def _property(claim: Claim, reader: Reader, _: ProvedLevel) -> Check:
     stated = next(stated for stated in reader.program.properties if stated.name == claim.name)
-    reads = tuple(dict.fromkeys(str(name) for condition in stated.about for name in read_by(condition)))
+    reads = tuple(map(str, spoken_of(stated)))
     watch = None if stated.monitor is None else Watch(stated)
 
     def check(now: Now) -> str:
