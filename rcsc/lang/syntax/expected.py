@@ -10,7 +10,9 @@ _DECLARATION = frozenset(
     + "EXTERN OWNER TABLE LEVEL".split()
 )
 _EXPRESSION = frozenset("TRUE FALSE REAL MASK LPAR FUNCTION NOT WAS ONCE EVENT".split())
-_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB HELD SINCE".split()) | {op.upper() for op in LOGIC}
+_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB HELD SINCE".split()) | {
+    op.upper() for op in LOGIC
+}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
 _WORDS = {
