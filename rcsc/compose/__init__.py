@@ -57,7 +57,7 @@ Further assumptions:
 - *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means, which are only listed.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
-Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that break what is not proved). Trusted are
-`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, Z3;
-not the search.
+Z3 confirms), `exact` (engines for what that leaves open), `proof` (of a level, and of the system), `counterexample` (runs that break what
+is not proved). Trusted are `contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in
+`proof.termination`, Z3; not the search.
 """

@@ -357,6 +357,13 @@ class TransitionSystem:
                     start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
 
+    def firsts(self) -> dict[str, Cycle]:
+        """Return the cycles with which a level can begin, by name."""
+        return {
+            "first": self.cycle(self.initial(), " at first"),
+            "restart": self.cycle(self.restarted(), " at restart", anew=True),
+        }
+
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""
         level = next(level for level in program.levels if level.name == self.level.name)

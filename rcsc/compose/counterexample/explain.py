@@ -21,7 +21,16 @@ from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
-from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, stopping, traces
+from rcsc.compose.counterexample.trace import (
+    USUAL,
+    NotReproducedError,
+    TraceResult,
+    TraceSearch,
+    stopping,
+    trace_of,
+    traces,
+)
+from rcsc.compose.exact.played import every_run
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
 from rcsc.proof.procedures.invariants import at_first
@@ -190,8 +199,18 @@ def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -
 def _searched(
     ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings, gave_up: set[ObligationKey]
 ) -> dict[ObligationKey, TraceResult]:
-    """Run the searches one after the other, each for the obligations still open."""
+    """Run the searches one after the other, each for the obligations still open; where all states can be searched, only as far as runs go.
+
+    Then a run may be as long as it has to be, however many cycles are asked for.
+    """
+    begun = settings.starts.get(str(ts.level.name), {})
+    every = None if begun else every_run(ts, tuple(ts.firsts().values()), asked)
     results: dict[ObligationKey, TraceResult] = {}
+    if every is not None:
+        shown = {owed.key: owed for owed in asked if owed.key in every.runs}
+        long = {key for key in shown if len(every.runs[key].taken) > min(settings.most, USUAL)}
+        results = {key: trace_of(ts, shown[key], every.runs[key]) for key in long}
+        asked = [owed for owed in asked if owed.key in shown or every.states is None]
     for search in settings.searches(str(ts.level.name)):
         left = [obligation for obligation in asked if obligation.key not in results]
         if left:

@@ -19,13 +19,14 @@ from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, su
 from rcsc.compose.contract.watched import begin
 from rcsc.compose.counterexample.cycle_run import CycleRun, Given, as_declared, broken, ran_on
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
+from rcsc.compose.exact.played import Played
+from rcsc.compose.invariant.cubes import held
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.interpret import (
     UNDEFINED,
     initial,
 )
 from rcsc.lang.model import (
-    Bool,
     Int,
     Op,
     Value,
@@ -135,6 +136,19 @@ def traces(
     return results
 
 
+def trace_of(ts: TransitionSystem, obligation: Obligation, run: Played) -> TraceResult:
+    """Run what a search of all states has found on the interpreter; return it, or an error if it does not break the obligation."""
+    neighbours = bool(ts.links.below) or ts.links.above is not None  # whose numbers may have gone round
+    search = TraceSearch(len(run.taken), restarted=run.restarted, legal=not neighbours)
+    try:
+        trace = _ran(ts, obligation, [(taken, ()) for taken in run.taken], run.start, search)
+    except UNDEFINED:  # `SAFE` says so
+        return NotReproducedError(obligation.shown, undefined=True)
+    if _breaks(ts, obligation, trace, len(run.taken)):
+        return trace
+    return NotReproducedError(obligation.shown, guessed=bool(run.opened))
+
+
 def stopping(
     ts: TransitionSystem, obligation: Obligation, predicates: Sequence[Predicate], clauses: Sequence[Clause]
 ) -> Trace | None:
@@ -183,7 +197,8 @@ class Unrolled:
         self._start = self.ts.restarted() if self.search.restarted else self.ts.initial()
         if self.search.invariant is not None:
             self._start = self.ts.havoc()
-            self._run.add(_within(*self.search.invariant, self._start))
+            for kept in held(*self.search.invariant, self._start):
+                self._run.add(kept)
         self._start |= {
             leaf: values.constant(self.ts.kinds[leaf], value) for leaf, value in self.search.start.items()
         }
@@ -317,23 +332,6 @@ class Unrolled:
             if other:
                 return tuple(other)
         return ("every leaf that the solver spoke of is the same in both",)
-
-
-def _within(predicates: Sequence[Predicate], clauses: Sequence[Clause], state: Leaves) -> Node:
-    """Return the condition that the clauses hold in the state: of each something does not."""
-    nodes = [predicate.node(state) for predicate in predicates]
-
-    def has(at: int, value: int) -> Node:
-        if value < 0:
-            return values.negation(has(at, ~value))
-        node = nodes[at]
-        if isinstance(node.kind, Bool):
-            return node if value else values.negation(node)
-        return values.equal(node, values.constant(node.kind, value))
-
-    return values.all_of(
-        values.negation(values.all_of(has(at, value) for at, value in clause)) for clause in clauses
-    )
 
 
 def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:

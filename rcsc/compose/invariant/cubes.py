@@ -9,6 +9,10 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.transition import Leaves
+from rcsc.lang.model import Bool
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.values import Node
 
 Valuation = tuple[int, ...]
 """A value for each predicate."""
@@ -46,6 +50,21 @@ def _spelled(predicate: Predicate, values: Sequence[int], none_of: str) -> str:
         if len(others) == 1
         else none_of.format(predicate.name, ", ".join(others))
     )
+
+
+def held(predicates: Sequence[Predicate], clauses: Iterable[Cube], state: Leaves) -> list[Node]:
+    """Return for each clause the condition that it holds in the state: of its pairs something does not."""
+    nodes = [predicate.node(state) for predicate in predicates]
+
+    def has(at: int, value: int) -> Node:
+        if value < 0:
+            return values.negation(has(at, ~value))
+        node = nodes[at]
+        if isinstance(node.kind, Bool):
+            return node if value else values.negation(node)
+        return values.equal(node, values.constant(node.kind, value))
+
+    return [values.negation(values.all_of(has(at, value) for at, value in clause)) for clause in clauses]
 
 
 @dataclass(slots=True)

@@ -16,6 +16,8 @@ from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # 
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.exact.portfolio import helped
+from rcsc.compose.exact.said import Found
 from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search, strengthened
@@ -27,7 +29,7 @@ from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.keyed import ExactIntegers, Keyed
 from rcsc.proof.symbolic.values import TRUE
 
 TOGETHER = 50
@@ -56,6 +58,9 @@ class LevelProof:
         unstated: Obligations that could not be stated, because part of the level was not recognised.
         stands: Whether its report stands once it has answered.
         parts: Where some claims need that no input is refused, the proofs with refusals and without; else none.
+        by: How obligations were proved that the search over predicates leaves open, in words.
+        conditions: Those that exact engines found, of which the last predicates are made.
+        exact: Whether it is confirmed only of terms in which all arithmetic of integers is exact (`keyed.ExactIntegers`).
     """
 
     level: str
@@ -71,6 +76,9 @@ class LevelProof:
     unstated: tuple[Unstated, ...] = ()
     stands: bool = False
     parts: "tuple[LevelProof, ...]" = ()
+    by: tuple[tuple[Key, str], ...] = ()
+    conditions: tuple[Found, ...] = ()
+    exact: bool = False
 
     def needs_admission(self, key: Key) -> bool:
         """Return whether an obligation is proved only if no input is refused."""
@@ -143,6 +151,7 @@ def joined(refusing: LevelProof, admitting: LevelProof) -> LevelProof:
         endings=endings,
         stands=refusing.stands or admitting.stands,
         parts=(without_nodes(refusing), without_nodes(admitting)),
+        by=tuple({**dict(admitting.by), **dict(refusing.by)}.items()),
     )
 
 
@@ -184,61 +193,118 @@ def _lacking(proof: LevelProof) -> tuple[str, ...]:
 
 def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Candidates) -> LevelProof:
     begun, cut_before = time.perf_counter(), smt.cut_short()
-    cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
+    cycle, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, cycle)
-    seen: Context | None = None
-    ends: tuple[Ending, ...] = ()
-    stands = False
-    try:
-        with smt.together(TOGETHER * effort.limits.steps):
-            invariant = search(ts, firsts, cycle, wanted, effort, known.clauses)
-            keep_candidates(cache, ts, invariant, known)
-            asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
-            aside = {
-                Sort.NUMBERED,
-                Sort.DONE_STAYS,
-                Sort.FAILED_STAYS,
-            }  # no line in context and no ending goes by them
-            aside |= {Sort.PROPERTY, Sort.REQUIREMENT} if ts.refuses else set()
-            looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
-            flow = Flow(ts, asked, invariant.clauses)
-            if looks and (
-                others := [
-                    *flow.no_loop_steps(),
-                    *flow.wanted_to_stand(),
-                    *never_run(asked, invariant.clauses, invariant.ran),
-                ]
-            ):
-                found = invariant.clauses
-                invariant = strengthened(ts, firsts, cycle, invariant, others)
-                keep_candidates(cache, ts, invariant, known)
-                if invariant.clauses != found:
-                    flow = Flow(ts, asked, invariant.clauses)
-            _confirm(asked, invariant.clauses)
-            verdicts = list(_verdicts(ts, asked, invariant, wanted))
-            if looks:
-                seen, ends = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
-                stands = flow.report_stands()
+    with smt.together(TOGETHER * effort.limits.steps):
+        try:
+            found = search(ts, firsts, cycle, wanted, effort, known.clauses)
+            keep_candidates(cache, ts, found, known)
+            concluded = _concluded(ts, firsts, cycle, wanted, found, effort)
             _uncut(cut_before)
-    except (GaveUpError, NotConfirmedError):
-        invariant, seen, ends, stands = FoundInvariant(), None, (), False
-        verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
+        except (GaveUpError, NotConfirmedError):
+            undecided = tuple((obligation, Verdict.UNDECIDED) for obligation in wanted)
+            concluded = _Concluded(FoundInvariant(), undecided)
+    keep_candidates(cache, ts, concluded.invariant, known)
     return LevelProof(
         ts.level.name,
-        tuple(verdicts),
-        invariant.predicates,
-        invariant.clauses,
-        invariant.walked,
-        invariant.learnt,
+        concluded.verdicts,
+        concluded.invariant.predicates,
+        concluded.invariant.clauses,
+        concluded.invariant.walked,
+        concluded.invariant.learnt,
         time.perf_counter() - begun,
-        context=seen,
-        endings=ends,
+        context=concluded.seen,
+        endings=concluded.endings,
         unstated=(
             *unstated(ts),
             *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts)),
         ),
-        stands=stands,
+        stands=concluded.stands,
+        by=concluded.by,
+        conditions=concluded.conditions,
+        exact=concluded.exact,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Concluded:
+    """What follows from an invariant that is confirmed; the parts are those of `LevelProof`."""
+
+    invariant: FoundInvariant
+    verdicts: tuple[tuple[Obligation, Verdict], ...]
+    seen: Context | None = None
+    endings: tuple[Ending, ...] = ()
+    stands: bool = False
+    by: tuple[tuple[Key, str], ...] = ()
+    conditions: tuple[Found, ...] = ()
+    exact: bool = False
+
+
+def _concluded(
+    ts: TransitionSystem,
+    firsts: tuple[Cycle, ...],
+    cycle: Cycle,
+    wanted: tuple[Obligation, ...],
+    found: FoundInvariant,
+    effort: Effort,
+) -> _Concluded:
+    """Conclude from the invariant that the exact engines make stronger; from what was found before, where that is not confirmed.
+
+    Raises:
+        GaveUpError: The solver did.
+        NotConfirmedError: Nothing is confirmed.
+    """
+    more = helped(ts, firsts, cycle, wanted, found)
+    for exact in (False, True) if more.by else ():
+        try:
+            concluded = _confirmed_of(ts, firsts, cycle, wanted, more.invariant, effort, exact=exact)
+        except NotConfirmedError:
+            continue
+        if all(verdict in ACCEPTED for owed, verdict in concluded.verdicts if owed.key in more.by):
+            return replace(concluded, by=tuple(more.by.items()), conditions=tuple(more.conditions))
+    return _confirmed_of(ts, firsts, cycle, wanted, found, effort)
+
+
+def _confirmed_of(
+    ts: TransitionSystem,
+    firsts: tuple[Cycle, ...],
+    cycle: Cycle,
+    wanted: tuple[Obligation, ...],
+    invariant: FoundInvariant,
+    effort: Effort,
+    *,
+    exact: bool = False,
+) -> _Concluded:
+    """Have an invariant confirmed, decide each obligation, and analyse the lines in context.
+
+    Raises:
+        GaveUpError: The solver did.
+        NotConfirmedError: It is no invariant.
+    """
+    asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits, exact=exact)
+    # no line in context and no ending goes by these
+    aside = {Sort.NUMBERED, Sort.DONE_STAYS, Sort.FAILED_STAYS} | (
+        {Sort.PROPERTY, Sort.REQUIREMENT} if ts.refuses else set()
+    )
+    looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
+    flow = Flow(ts, asked, invariant.clauses)
+    if looks and (
+        others := [
+            *flow.no_loop_steps(),
+            *flow.wanted_to_stand(),
+            *never_run(asked, invariant.clauses, invariant.ran),
+        ]
+    ):
+        found = invariant.clauses
+        invariant = strengthened(ts, firsts, cycle, invariant, others)
+        if invariant.clauses != found:
+            flow = Flow(ts, asked, invariant.clauses)
+    _confirm(asked, invariant.clauses)
+    verdicts = tuple(_verdicts(ts, asked, invariant, wanted))
+    if not looks:
+        return _Concluded(invariant, verdicts, exact=exact)
+    seen, endings = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
+    return _Concluded(invariant, verdicts, seen, endings, flow.report_stands(), exact=exact)
 
 
 def _uncut(before: int) -> None:
@@ -252,9 +318,14 @@ def _uncut(before: int) -> None:
 
 
 def _asked_anew(
-    predicates: tuple[Predicate, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
+    predicates: tuple[Predicate, ...],
+    firsts: tuple[Cycle, ...],
+    cycle: Cycle,
+    limits: Limits,
+    *,
+    exact: bool = False,
 ) -> Confirmation:
-    return Confirmation(predicates, firsts, cycle, cycle.cases, Keyed(), limits)
+    return Confirmation(predicates, firsts, cycle, cycle.cases, ExactIntegers() if exact else Keyed(), limits)
 
 
 def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
@@ -284,14 +355,6 @@ def _confirmed(question: Solver, steps: int, seed: int) -> bool:
     if answer is Answer.SATISFIABLE:
         raise NotConfirmedError
     return answer is Answer.UNSATISFIABLE
-
-
-def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
-    """Return the cycles with which a level can begin, by name."""
-    return {
-        "first": ts.cycle(ts.initial(), " at first"),
-        "restart": ts.cycle(ts.restarted(), " at restart", anew=True),
-    }
 
 
 def _verdicts(
@@ -400,8 +463,8 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
 
 def _certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits) -> dict[str, str]:
     """Write the questions of one environment."""
-    cycle, firsts = ts.cycle(ts.havoc()), _firsts(ts)
-    asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits)
+    cycle, firsts = ts.cycle(ts.havoc()), ts.firsts()
+    asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits, exact=proof.exact)
     clauses = proof.clauses
     scripts = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
     names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]

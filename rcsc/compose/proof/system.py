@@ -23,6 +23,7 @@ from rcsc.compose.contract.obligations import Obligation, Unstated, obligations
 from rcsc.compose.contract.predicates import CLOSELY, compared
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Safety, TransitionSystem
+from rcsc.compose.exact.said import Found, predicate
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import agreements, claims, of_level, other_end
@@ -329,6 +330,9 @@ class _Kept:
     unstated: tuple[Unstated, ...]
     stands: bool
     parts: "tuple[_Kept, ...]" = ()
+    by: tuple[tuple[Key, str], ...] = ()
+    conditions: tuple[Found, ...] = ()
+    exact: bool = False
 
 
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
@@ -358,6 +362,7 @@ def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
         return None
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, read(cycle, wanted), closely)
+        chosen += tuple(predicate(found, ts.kinds) for found in kept.conditions)
         if tuple(predicate.name for predicate in chosen) == kept.predicates:
             verdicts = tuple(
                 (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
@@ -365,6 +370,7 @@ def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
             return LevelProof(
                 ts.level.name, verdicts, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
                 context=kept.context, endings=kept.endings, unstated=kept.unstated, stands=kept.stands,
+                by=kept.by, conditions=kept.conditions, exact=kept.exact,
             )  # fmt: skip
     return None
 
@@ -382,6 +388,7 @@ def _kept(proof: LevelProof) -> _Kept:
         tuple((obligation.key, verdict) for obligation, verdict in proof.verdicts),
         tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
         proof.context, proof.endings, proof.unstated, proof.stands, tuple(map(_kept, proof.parts)),
+        proof.by, proof.conditions, proof.exact,
     )  # fmt: skip
 
 

@@ -138,10 +138,14 @@ class Keyed:
             case _ if takes_bits(node):
                 return smt.integer_operation(op.value, parts[0], parts[1])
             case _:
-                return self.any(node)
+                return self.of_integers(op, node, parts)
 
     def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
         """Return an operation with a real in it."""
+        return self.any(node)
+
+    def of_integers(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - as above
+        """Return an operation of integers that is not linear: products, quotients, remainders."""
         return self.any(node)
 
     def any(self, node: Node) -> Term:
@@ -154,6 +158,16 @@ class Keyed:
         if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
             self.within(term, node.low, node.high, node.kind)
         return term
+
+
+class ExactIntegers(Keyed):
+    """Makes terms in which products, quotients and remainders of integers are what they are: slower, and asked only where it matters."""
+
+    def of_integers(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
+        """Return a product, a quotient or a remainder; a division by zero, which no cycle does, gives any value."""
+        if op in (Op.MUL, Op.DIV, Op.MOD):
+            return smt.integer_operation(op.value, parts[0], parts[1])
+        return super().of_integers(op, node, parts)
 
 
 def _key(kind: Scalar, key: int) -> Term:

@@ -174,6 +174,11 @@ def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
     return _all_hold(list(parts_first(condition)), [condition], point)
 
 
+def value_at(node: Node, point: Mapping[str, Value]) -> Value | None:
+    """Return the value of a node at a point that has one for each of its variables; None where it is undefined."""
+    return _known(list(parts_first(node)), point)[node]
+
+
 def met(conditions: Sequence[Node], goals: Sequence[Node], near: Mapping[str, Value]) -> dict[Node, Point]:
     """Find goals that hold at some point at which all conditions hold, each with such a point; what is not found may hold at another.
 

@@ -2,8 +2,9 @@
 
 import io
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from itertools import groupby
 from typing import Any
 
 import click
@@ -25,6 +26,8 @@ _WIDTH = 118
 """Columns of a time line."""
 _LONG = 33
 """Characters of an assignment that a column has room for, whatever the others hold."""
+FOLDED = 4
+"""More cycles than so many that do alike are shown as one row."""
 _HARD = "\ue000"
 """A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
 
@@ -216,15 +219,35 @@ def _time_line(shown: Sequence[TimeLineRow]) -> Table:
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
         table.add_column(heading, overflow="fold")
-    for row in shown:
+    for cycles, row in [(str(row.tick or ""), row) for row in shown] if several else _folded(shown):
         takes, leaves = (
             ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
             for changed in (row.takes, row.leaves)
         )
         ran = "\n".join(row.ran) if row.tick else row.line
         ran += f"\n! {row.wrong}" if row.wrong else ""
-        table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
+        table.add_row(cycles, *((row.level,) if several else ()), ran, takes, leaves)
     return table
+
+
+def _folded(shown: Sequence[TimeLineRow]) -> Iterator[tuple[str, TimeLineRow]]:
+    """Yield the cycles of each row and the row; cycles that run one line and change the same leaves, as a counter does, are one row."""
+    for _, group in groupby(shown, key=_alike):
+        same = list(group)
+        if len(same) <= FOLDED:
+            yield from ((str(row.tick or ""), row) for row in same)
+            continue
+        first, last = same[0], same[-1]
+        leaves = {
+            name: value if value == last.leaves[name] else f"{value} to {last.leaves[name]}"
+            for name, value in first.leaves.items()
+        }
+        yield f"{first.tick} to {last.tick}", replace(first, leaves=leaves)
+
+
+def _alike(row: TimeLineRow) -> tuple[object, ...]:
+    alone = row.tick if row.takes or row.wrong or not row.tick else 0
+    return alone, row.level, row.ran, tuple(row.leaves)
 
 
 def _unbroken(text: str) -> str:

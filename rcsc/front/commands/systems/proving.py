@@ -206,6 +206,7 @@ def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet:
 def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> Iterator[str]:
     """Yield the lines of one level: its assumptions first, then its other obligations, each with the unproved claims it rests on."""
     declared = {str(assumption.name): assumption.standing.value for assumption in ts.program.assumptions}
+    how = {key: f", {by}" for key, by in proof.by if whole.of(proof.level, key).proved}
     found_before = ", by an earlier run" if proof.cached else ""
     yield click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}"
     for sort in Sort:
@@ -221,6 +222,7 @@ def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> It
             for obligation in obligations:
                 yield (
                     f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
+                    f"{how.get(obligation.key, '')}"
                 )
         elif obligations:
             good = [obligation for obligation in obligations if whole.of(proof.level, obligation.key).proved]
@@ -374,6 +376,7 @@ def _as_json(
                         "table": obligation.table,
                         "name": obligation.name,
                         **claim(proof, level.level, obligation.key),
+                        "by": dict(level.by).get(obligation.key, ""),
                     }
                     for obligation, _ in level.verdicts
                 ],

@@ -1,0 +1,153 @@
+"""A circuit for other people's model checkers: as AIGER 1.9 text in bytes, the form of the hardware model checking competition.
+
+In: a circuit. Out: a binary file with an output for each obligation, which is 1 where it is broken. Latch `started` tells a first cycle
+from a later one, input `restarts` a first one from that after a restart; once latch `ended` is 1, the environment has broken the contract
+or the cycle has ended in a fault, and nothing is bad any more.
+
+Source: Biere, Heljanko and Wieringa, "AIGER 1.9 and beyond", 2011.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.compose.exact.circuit import EARLY, Circuit, Gate
+from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal
+
+STARTED, ENDED, RESTARTS = "started", "ended", "restarts"
+
+
+@dataclass(slots=True)
+class _Whole:
+    """The frames of a circuit as one, with gates of its own after theirs."""
+
+    circuit: Circuit
+    ands: dict[Literal, Gate] = field(init=False)
+    count: int = field(init=False)
+    _made: dict[Gate, Literal] = field(init=False)
+    started: Literal = field(init=False)
+    ended: Literal = field(init=False)
+    restarts: Literal = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.ands, self.count = dict(self.circuit.ands), self.circuit.count
+        self._made = {gate: variable for variable, gate in self.ands.items()}
+        self.started, self.ended, self.restarts = (self._fresh() for _ in range(3))
+
+    def _fresh(self) -> Literal:
+        self.count += 1
+        return self.count
+
+    def both(self, a: Literal, b: Literal) -> Literal:
+        """Return the literal of *a and b*."""
+        if FALSE in (a, b) or a == -b:
+            return FALSE
+        if a in (b, TRUE):
+            return b
+        if b == TRUE:
+            return a
+        gate = min(a, b), max(a, b)
+        if gate not in self._made:
+            self._made[gate] = made = self._fresh()
+            self.ands[made] = gate
+        return self._made[gate]
+
+    def choice(self, when: Literal, then: Literal, orelse: Literal) -> Literal:
+        """Return `then` or `orelse`."""
+        if then == orelse:
+            return then
+        return -self.both(-self.both(when, then), -self.both(-when, orelse))
+
+    def of(self, part: Sequence[Literal]) -> Literal:
+        """Choose among the literals of the frames: the first ones', then that of a later cycle."""
+        first, *others, later = part
+        for other in others:
+            first = self.choice(self.restarts, other, first)
+        return self.choice(self.started, later, first)
+
+
+def aiger(circuit: Circuit, wanted: Iterable[int] | None = None, *, together: bool = False) -> bytes:
+    """Return a circuit in binary AIGER, with outputs for these obligations, by position; or one for all of them `together`."""
+    whole, frames = _Whole(circuit), (*circuit.firsts, circuit.step)
+    valid = whole.both(-whole.ended, whole.of([frame.valid for frame in frames]))
+    on = whole.both(valid, whole.of([frame.goes_on for frame in frames]))
+    places = range(len(circuit.wanted)) if wanted is None else list(wanted)
+    bad = {
+        " ".join(filter(None, circuit.wanted[at])): whole.both(
+            valid if circuit.wanted[at][0] in EARLY else on,
+            -whole.of([frame.holds[at] for frame in frames]),
+        )
+        for at in places
+    }
+    if together:
+        fine = TRUE
+        for one in bad.values():
+            fine = whole.both(fine, -one)
+        bad = {"all": -fine}
+    latches = {whole.started: TRUE, whole.ended: -on}
+    latches |= {
+        latch: whole.of([frame.after[at] for frame in frames]) for at, latch in enumerate(circuit.latches)
+    }
+    names = {whole.started: STARTED, whole.ended: ENDED, whole.restarts: RESTARTS, **dict(_names(circuit))}
+    return _written(whole, latches, bad, names)
+
+
+def _names(circuit: Circuit) -> Iterator[tuple[Literal, str]]:
+    """Name each latch and input by its variable, and the place of its bit."""
+    words = dict(zip(circuit.leaves, circuit.words, strict=True))
+    words |= {name: given.word for name, given in circuit.given.items()}
+    for name, word in words.items():
+        for place, bit in enumerate(word):
+            if abs(bit) != TRUE:
+                yield abs(bit), f"{name}[{place}]" if len(word) > 1 else name
+
+
+def _written(
+    whole: _Whole, latches: dict[Literal, Literal], bad: dict[str, Literal], names: dict[Literal, str]
+) -> bytes:
+    needed, waiting = set[Literal](), [abs(literal) for literal in bad.values()]
+    while waiting:
+        variable = waiting.pop()
+        if variable not in needed and variable != TRUE:
+            needed.add(variable)
+            waiting += map(abs, whole.ands.get(variable, ()))
+            waiting += [abs(latches[variable])] if variable in latches else []
+    kept = [latch for latch in latches if latch in needed]
+    inputs = sorted(needed.difference(whole.ands, latches))
+    gates = [gate for gate in sorted(whole.ands) if gate in needed]
+    number = {variable: at for at, variable in enumerate((*inputs, *kept, *gates), 1)}
+
+    def code(literal: Literal) -> int:
+        if abs(literal) == TRUE:
+            return int(literal > 0)
+        return 2 * number[abs(literal)] + (literal < 0)
+
+    lines = [f"aig {len(number)} {len(inputs)} {len(kept)} {len(bad)} {len(gates)}"]
+    lines += [str(code(latches[latch])) for latch in kept]
+    lines += [str(code(literal)) for literal in bad.values()]
+    written = bytearray("".join(f"{line}\n" for line in lines).encode())
+    for gate in gates:
+        low, high = sorted(map(code, whole.ands[gate]))
+        for difference in (2 * number[gate] - high, high - low):
+            written += _seven_bits_each(difference)
+    named = [("i", inputs), ("l", kept)]
+    symbols = [
+        f"{sort}{at} {_one_line(names[one])}"
+        for sort, every in named
+        for at, one in enumerate(every)
+        if one in names
+    ]
+    symbols += [f"o{at} {_one_line(name)}" for at, name in enumerate(bad)]
+    return bytes(written) + "".join(f"{line}\n" for line in symbols).encode()
+
+
+def _one_line(name: str) -> str:
+    return " ".join(name.split())
+
+
+def _seven_bits_each(number: int) -> bytes:
+    parts = bytearray()
+    while number > 0x7F:  # seven bits, and one that more follow
+        parts.append(number & 0x7F | 0x80)
+        number >>= 7
+    parts.append(number)
+    return bytes(parts)

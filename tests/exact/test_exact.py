@@ -1,0 +1,352 @@
+"""Each engine against every state of drawn levels; what is trusted broken once, and noticed; the cases that asked for the engines."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+import z3
+
+from rcsc.compose.contract.claims import SAFE
+from rcsc.compose.contract.obligations import ObligationKey, Sort, obligations
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.counterexample.trace import Trace, trace_of
+from rcsc.compose.exact import circuit as circuits
+from rcsc.compose.exact import explicit, played
+from rcsc.compose.exact.bounded import Looked, looked
+from rcsc.compose.exact.circuit import Circuit, Frame, Gates, circuit
+from rcsc.compose.exact.explicit import Explored
+from rcsc.compose.exact.said import boxes, predicate
+from rcsc.compose.exact.spacer import Lemmas, related
+from rcsc.compose.proof.level import Verdict, certificate, prove_level
+from rcsc.lang.interpret import holds
+from rcsc.lang.model import Int
+from rcsc.lang.operator_table import Arithmetic, Op, divide
+from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.bits import TRUE
+from tests.compose.test_hierarchies import roles
+from tests.exact.judged import Truth, drawn, truth
+from tests.small_hierarchies.explored import explored
+from tests.small_hierarchies.more import furnished
+from tests.support.programs.systems import LITTLE, alone
+
+SEEDS = (1, 3, 6, 7, 8, 12, 15, 16, 18)
+DEEP = 6
+HIERARCHIES = (20_000, 20_044, 20_302)
+
+
+@cache
+def judged(seed: int, linear: bool = False) -> tuple[TransitionSystem, Truth]:
+    ts = alone(drawn(seed, linear=linear))
+    return ts, truth(ts)
+
+
+def made(ts: TransitionSystem) -> Circuit:
+    step = ts.cycle(ts.havoc())
+    stated = [owed for owed in obligations(ts, step) if owed.sort is Sort.PROPERTY]
+    return circuit(ts, tuple(ts.firsts().values()), step, stated)
+
+
+def lengths(found: Explored | Looked, begins: int) -> dict[ObligationKey, int]:
+    return {key: len(run.given) for key, run in found.runs.items() if run.begins == begins}
+
+
+# --- engines against the judge --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_search_of_states_finds_just_what_is_true(seed: int) -> None:
+    ts, true = judged(seed)
+    one = made(ts)
+    assert one.opened == ()
+    found = explicit.explored(one)
+    assert (lengths(found, 0), lengths(found, 1)) == (true.least, true.restarted)
+    if len(found.runs) < len(one.wanted):  # else it may end before it has seen all
+        assert found.complete
+        leaves = list(ts.program.variables)
+        places = [next(at for at, v in enumerate(leaves) if v.name == name) for name in one.leaves]
+        every = {tuple(int(state[at]) for at in places) for state in true.states}
+        assert set(explicit.keys_of(one, found.states)) == every
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_bounded_search_finds_just_the_runs_that_there_are(seed: int) -> None:
+    ts, true = judged(seed)
+    found = looked(made(ts), DEEP)
+    first = {key: cycles for key, cycles in true.least.items() if cycles <= DEEP}
+    assert lengths(found, 0).items() <= true.least.items()
+    assert {key for key in first if key in lengths(found, 0) or lengths(found, 1)[key] < first[key]} == set(
+        first
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_run_is_one_by_the_interpreter_and_none_is_shorter(seed: int) -> None:
+    ts, true = judged(seed)
+    step = ts.cycle(ts.havoc())
+    stated = {owed.key: owed for owed in obligations(ts, step) if owed.sort is Sort.PROPERTY}
+    every = played.every_run(ts, tuple(ts.firsts().values()), list(stated.values()))
+    assert every is not None
+    assert set(every.runs) == {*true.least, *true.restarted}
+    for key, run in every.runs.items():
+        trace = trace_of(ts, stated[key], run)
+        assert isinstance(trace, Trace)
+        assert len(trace.steps) == true.least.get(key, true.restarted.get(key))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_level_is_proved_just_where_no_run_breaks_it(seed: int) -> None:
+    ts, true = judged(seed, linear=True)
+    proof = prove_level(ts, LITTLE)
+    verdicts = {owed.key: verdict for owed, verdict in proof.verdicts if owed.sort is Sort.PROPERTY}
+    wrong = {*true.least, *true.restarted}
+    assert {key for key, verdict in verdicts.items() if verdict is Verdict.PROVED} == set(verdicts) - wrong
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_spacer_says_what_is_true_and_what_it_finds_is_an_invariant(seed: int) -> None:
+    ts, true = judged(seed, linear=True)
+    step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+    for owed in obligations(ts, step):
+        if owed.sort is not Sort.PROPERTY:
+            continue
+        answer, conditions = related(ts, firsts, step, owed, Lemmas(), 4_000_000)
+        breaks = owed.key in true.least or owed.key in true.restarted
+        assert answer in {Answer.UNKNOWN, Answer.SATISFIABLE if breaks else Answer.UNSATISFIABLE}
+        said = [predicate(one, ts.kinds).condition for one in conditions]
+        names = [str(v.name) for v in ts.program.variables]
+        for state in sorted(true.states) if answer is Answer.UNSATISFIABLE else ():
+            assert all(one is not None and holds(one, dict(zip(names, state, strict=True))) for one in said)
+
+
+@pytest.mark.parametrize("seed", HIERARCHIES)
+def test_bounded_search_agrees_on_levels_with_neighbours(seed: int, tmp_path: Path) -> None:
+    """Numbers of 16 bits, reports that are late, assumptions that stop: what runs break, and in how many cycles."""
+    for role in roles(furnished(seed), tmp_path).values():
+        ts = TransitionSystem(role.program, role.level, role.links)
+        true = explored(role)
+        step = ts.cycle(ts.havoc())
+        wanted = [owed for owed in obligations(ts, step) if owed.key != SAFE]
+        one = circuit(ts, tuple(ts.firsts().values()), step, wanted)
+        assert one.opened == ()
+        found = looked(one, 4)
+        short = {key: cycles for key, cycles in true.least.items() if cycles <= 4}
+        begun = lengths(found, 0)
+        assert begun.items() <= short.items()
+        assert all(key in begun or lengths(found, 1)[key] <= cycles for key, cycles in short.items())
+        assert set(lengths(found, 1)) <= {*true.least, *true.restarted}
+
+
+def test_the_drawn_levels_are_worth_the_search() -> None:
+    every = [judged(seed)[1] for seed in SEEDS]
+    assert sum(bool(one.least) for one in every) > len(every) // 3
+    assert any(len(one.least) < 2 for one in every)
+    assert max(max(one.least.values(), default=0) for one in every) > 3
+    assert max(len(one.states) for one in every) > 50
+
+
+# --- what is trusted, broken once -----------------------------------------------------------
+
+
+def disagrees() -> bool:
+    """Whether the judge notices anything of the search of states."""
+    for seed in SEEDS:
+        ts, true = judged(seed)
+        found = explicit.explored(made(ts))
+        if (lengths(found, 0), lengths(found, 1)) != (true.least, true.restarted):
+            return True
+    return False
+
+
+def swapped(self: Gates, when: int, then: int, orelse: int) -> int:
+    return _MUX(self, when, orelse, then)
+
+
+_MUX, _SAME, _TIMES, _DIVIDED = Gates._mux, Gates._same, Gates._times, Gates._divided
+
+
+ARITHMETIC: dict[Arithmetic, Callable[[int, int], int]] = {
+    Op.MUL: lambda a, b: a * b,
+    Op.DIV: divide,
+    Op.MOD: lambda a, b: a - b * divide(a, b),
+}
+
+
+def arithmetic_is_right() -> bool:
+    """Whether products, quotients and remainders of two variables are right for every pair of values but a zero divisor."""
+    kind = Int(-9, 9)
+    for op, meaning in ARITHMETIC.items():
+        gates = Gates()
+        node = values.arithmetic(op, tuple(values.variable(name, kind) for name in "ij"), Int(-99, 99))
+        result, words = gates.word(node), [gates.named[name] for name in "ij"]
+        for pair in product(range(-9, 10), repeat=2):
+            if op is not Op.MUL and not pair[1]:
+                continue
+            bits = {
+                abs(bit): (key >> at & 1 == 1) == (bit > 0)
+                for word, key in zip(words, pair, strict=True)
+                for at, bit in enumerate(word)
+                if abs(bit) != TRUE
+            }
+            bits[TRUE] = True
+            for gate, (a, b) in gates.ands.items():
+                bits[gate] = bits[abs(a)] == (a > 0) and bits[abs(b)] == (b > 0)
+            if circuits.key_of_word(kind, result, bits) != meaning(*pair):
+                return False
+    return True
+
+
+def test_arithmetic_of_integers_is_exact() -> None:
+    assert arithmetic_is_right()
+
+
+@pytest.mark.parametrize(
+    ("name", "broken"),
+    [
+        ("_times", lambda self, a, b: _TIMES(self, a, (*b[:-1], -1))),
+        ("_divided", lambda self, a, b: _DIVIDED(self, a, b)[::-1]),
+        ("_mux", swapped),
+    ],
+)
+def test_arithmetic_that_is_wrong_is_noticed(name: str, broken: Callable[..., object]) -> None:
+    with patch.object(Gates, name, broken):
+        assert not arithmetic_is_right()
+
+
+@pytest.mark.parametrize(
+    ("name", "broken"), [("_mux", swapped), ("_same", lambda self, a, b: _SAME(self, a, -b))]
+)
+def test_a_gate_that_is_wrong_is_noticed(name: str, broken: Callable[..., object]) -> None:
+    with patch.object(Gates, name, broken):
+        assert disagrees()
+
+
+def test_a_frame_that_begins_otherwise_is_noticed() -> None:
+    real = circuits._frame
+
+    def later(gates: Gates, cycle: Cycle, *more: Any) -> Frame:
+        frame = real(gates, cycle, *more)
+        return replace(frame, after=tuple(-bit for bit in frame.after)) if cycle.before["n"].known else frame
+
+    with patch.object(circuits, "_frame", later):
+        assert disagrees()
+
+
+WIRED = """\
+input a : int 0 .. 3
+input fine : bool
+state n : int 0 .. 3
+assume small assumed : a <= 2
+module take reads a, n writes n { n := a }
+table t assuming small {
+| line | fine || n |
+|---|---||---|
+| one | true || |
+| other | false || 0 |
+}
+property kept : n <= 2
+level solo { period 10 [ms] preprocess take table t }
+"""
+
+
+def test_a_contract_that_is_dropped_is_noticed() -> None:
+    ts = alone(WIRED)
+    one = made(ts)
+    assert explicit.explored(one).runs == {}
+    dropped = replace(
+        one,
+        firsts=tuple(replace(frame, valid=TRUE) for frame in one.firsts),
+        step=replace(one.step, valid=TRUE),
+    )
+    assert [key[2] for key in explicit.explored(dropped).runs] == ["kept"]
+
+
+# --- what it says ---------------------------------------------------------------------------
+
+
+def test_states_are_said_as_few_boxes() -> None:
+    assert boxes([(0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (4, 4)]) == [
+        ((0, 1), (1, 3)),
+        ((4, 4), (4, 4)),
+    ]
+    assert boxes([]) == []
+
+
+LIGHT = """\
+enum light { red, green }
+input go : bool
+state now : light
+state wait : int 0 .. 1000
+module count reads now, wait writes wait { if now = red { wait := min(wait + 1, 1000) } else { wait := 0 } }
+table t {
+| line | now | wait | go || now |
+|---|---|---|---||---|
+| stays | red | < 30 | || |
+| goes | red | >= 30 | true || green |
+| holds | red | >= 30 | false || |
+| back | green | | || red |
+}
+property soon : now = green implies wait {least}
+level solo { period 40 [ms] preprocess count table t }
+"""
+
+
+ROUND = """\
+enum phase { one, two, three }
+state now : phase
+state since : int 0 .. 1000
+module count reads now, since writes since { if now = one { since := 0 } else { since := min(since + 1, 1000) } }
+table t {
+| line | now || now |
+|---|---||---|
+| to_two | one || two |
+| to_three | two || three |
+| to_one | three || one |
+}
+property soon : since <= 2
+level solo { period 40 [ms] preprocess count table t }
+"""
+"""No predicate tells `since = 0` from `since = 1`, so the search over predicates leaves it open."""
+
+
+def test_a_bound_is_proved_by_all_states_and_its_certificate_holds() -> None:
+    ts = alone(ROUND)
+    proof = prove_level(ts, LITTLE)
+    [(key, how)] = proof.by
+    assert (key[2], how) == ("soon", "by search of all 3 states")
+    assert proof.verdict(Sort.PROPERTY, name="soon") is Verdict.PROVED
+    scripts = certificate(ts, proof)
+    assert {"first", "restart", "step t", "goals property"} <= set(scripts)
+    assert all(refuted(text) for text in scripts.values())
+
+
+def test_a_bound_that_is_too_low_is_broken_by_a_run_that_waits() -> None:
+    ts = alone(LIGHT.replace("{least}", "< 30"))
+    proof = prove_level(ts, LITTLE)
+    [broken] = proof.open
+    every = played.every_run(ts, tuple(ts.firsts().values()), [broken])
+    assert every is not None
+    run = every.runs[broken.key]
+    assert isinstance(trace_of(ts, broken, run), Trace)
+    assert len(run.taken) == 30
+
+
+def test_what_the_engines_say_falsely_is_not_believed() -> None:
+    """An engine that leaves out a state says conditions that are no invariant: Z3 does not confirm them, and nothing else is lost."""
+    ts = alone(ROUND)
+    with patch.object(explicit, "keys_of", lambda _, states: [(0, 1)] * len(states)):
+        proof = prove_level(ts, LITTLE)
+    verdicts = {owed.sort: verdict for owed, verdict in proof.verdicts}
+    assert verdicts[Sort.PROPERTY] is Verdict.NOT_PROVED
+    assert verdicts[Sort.ONE_LINE] is Verdict.PROVED
+
+
+def refuted(script: str) -> bool:
+    solver = z3.Solver()
+    solver.from_string(script)
+    return bool(solver.check() == z3.unsat)
