@@ -627,6 +627,7 @@ class Property:
         text: As it was written, after the colon.
         standard: Whether it comes with the protocol, and nobody wrote it.
         monitor: Of a requirement over time, the states that its condition reads.
+        monitored: Whether every run watches it.
     """
 
     name: str
@@ -637,6 +638,7 @@ class Property:
     standard: bool = field(default=False, compare=False)
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
     monitor: "Monitor | None" = None
+    monitored: bool = field(default=False, compare=False)
 
     @property
     def word(self) -> str:

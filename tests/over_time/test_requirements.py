@@ -36,7 +36,7 @@ state never : bool
 
 ## Doc.
 requirement last req "R1" : at once before
-requirement cycles : while before or always, when within, within 3 cycles, never
+requirement cycles monitored : while before or always, when within, within 3 cycles, never
 # why
 requirement at : before always, before within, (never)
 requirement once : before always, (never)

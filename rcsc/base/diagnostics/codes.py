@@ -1792,7 +1792,8 @@ class Code(StrEnum):
     PROPERTY_BROKEN = """RCS743: a property does not hold
 
     In an episode of `rcsc campaign` or `rcsc test` something happened that must not: a state-table error, an assumption that failed, an
-    order taken twice, an answer that changed, a command that did not end, or one of your own properties. The message names the property,
+    order taken twice, an answer that changed, a command that did not end, or one of your own properties. Or a run of `rcsc run` broke a
+    requirement that is `monitored`: `rcsc replay LOG --find "not LEVEL.REQUIREMENT"` shows the cycle. The message names the property,
     the cycle and what was seen; the folder that is named has the episode as small as it could be made, which `rcsc campaign SYSTEM
     --again FOLDER` runs again, its script, and of a campaign its log for `rcsc replay`. What a fault explains that breaks the
     contract between levels, an older value that comes again, is no such finding.

@@ -160,7 +160,9 @@ def _requirement(scope: Scope, written: tree.RequirementDecl) -> Property | None
         return None
     name, doc, text = written.name, " ".join(written.doc), spell_required(written)
     named = requirements(scope, written.requirements)
-    return Property(name.text, kept, text, doc, name.span, requirements=named, monitor=watch)
+    return Property(
+        name.text, kept, text, doc, name.span, requirements=named, monitor=watch, monitored=written.monitored
+    )
 
 
 def _required(scope: Scope, written: tree.RequirementDecl) -> requirement.Requirement | None:

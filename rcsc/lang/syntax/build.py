@@ -196,7 +196,9 @@ class Build:
 
     def _requirement_decl(self, node: ParseNode) -> tree.RequirementDecl:
         head = self._required(node)
-        name, *parts, response = (part for part in node.children if self._rule(part) != "req")
+        monitored = self._kind(node.children, "WATCHED") is not None
+        kept = [part for part in node.children if getattr(part, "type", "") != "WATCHED"]
+        name, *parts, response = (part for part in kept if self._rule(part) != "req")
         scope, asks, takes = (self._worded(parts, before) for before in ("in_", "asks_", "takes_"))
         mode, *end = scope[1]
         *other, last = takes[1]
@@ -213,6 +215,7 @@ class Build:
             None if time is not None else last,
             end[0] if end else None,
             other[0] if other else None,
+            monitored,
             **head,
         )
 

@@ -47,6 +47,7 @@ _WORDS = {
     "GROUPS": "bits",
     "HELD": "`for`",
     "AT_ONCE": "`once`",
+    "WATCHED": "`monitored`",
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",

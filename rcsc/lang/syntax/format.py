@@ -69,7 +69,8 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
         case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
             yield _claim(declaration)
         case tree.RequirementDecl(name):
-            yield f"requirement {name.text}{spell_req(declaration)} : {spell_required(declaration)}"
+            word = " monitored" * declaration.monitored
+            yield f"requirement {name.text}{word}{spell_req(declaration)} : {spell_required(declaration)}"
         case tree.ProcedureDecl():
             yield from _procedure(declaration)
         case tree.OwnerDecl(name, members):

@@ -723,7 +723,7 @@ class Time:
 
 @dataclass(frozen=True, slots=True)
 class RequirementDecl(Required):
-    """`requirement name [req ..] : [while c,] [when c,] within time, expr`: scope, trigger, timing and response.
+    """`requirement name [monitored] [req ..] : [while c,] [when c,] within time, expr`: scope, trigger, timing and response.
 
     Attributes:
         scope: The words of the scope; "" for none. `mode` is its condition, and `end` that of its end, where it has one.
@@ -744,6 +744,7 @@ class RequirementDecl(Required):
     stop: Expr | None = None
     end: Expr | None = None
     times: Expr | None = None
+    monitored: bool = False
 
 
 @dataclass(frozen=True, slots=True)

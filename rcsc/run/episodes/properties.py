@@ -10,7 +10,6 @@ from rcsc.lang import model
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by, spoken_of
 from rcsc.lang.model import BEFORE, Value
-from rcsc.lang.over_time import Watch
 from rcsc.run.episodes.cycle import Broken, Cycle, Property
 from rcsc.run.episodes.operator import Given
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
@@ -18,6 +17,7 @@ from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Stand
 from rcsc.run.executors import Twins
 from rcsc.run.levels import RunningLevel
+from rcsc.run.log.required import LevelWatch, watch_of
 from rcsc.run.orders.roles import Served, field_of
 from rcsc.run.plant.bind import BoundPlant, raised
 from rcsc.run.signature import FAULTS, STOPPED, Signature, Values
@@ -149,33 +149,22 @@ class LevelProperty:
 
 @dataclass(slots=True)
 class LevelRequirement:
-    """A requirement over time that a program declares. Each cycle of the level is one of the run, a refused one, too.
-
-    Attributes:
-        reads: Where what it reads stands among the level's values.
-    """
+    """A requirement over time that a program declares. Each cycle of the level is one of the run, a refused one, too."""
 
     level: str
-    its: Watch
-    reads: Mapping[str, int]
+    its: LevelWatch
 
     def watch(self, cycle: Cycle) -> Iterator[Broken]:
         """Yield the values of the cycle that breaks it."""
         level = cycle.levels[self.level]
         if self.level in cycle.restarted:
-            self.its.begin()
-        if level not in cycle.ran or self.its.keeps(self._of(cycle.left[self.level]), self._of(level.values)):
-            return
-        leaves = level.sign.leaves
-        words = ", ".join(
-            f"`{name}` = {leaves[at].shown(level.values[at])}" for name, at in self.reads.items()
-        )
-        where = level.ran if level.level.stages else f"line `{level.line}`"
-        text = f"`{self.its.stated.text}` is broken in {where}: {words}"
-        yield Broken(f"{self.level}: {self.its.stated.name}", text, self.level)
-
-    def _of(self, values: Values) -> dict[str, Value]:
-        return {name: values[at] for name, at in self.reads.items()}
+            self.its.watch.begin()
+        if level in cycle.ran and (shown := self.its.broken(cycle.left[self.level], level.values)):
+            where = level.ran if level.level.stages else f"line `{level.line}`"
+            stated = self.its.stated
+            yield Broken(
+                f"{self.level}: {stated.name}", f"`{stated.text}` is broken in {where}: {shown}", self.level
+            )
 
 
 def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
@@ -185,10 +174,9 @@ def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
 
 
 def _of_level(level: str, sign: Signature, stated: model.Property) -> LevelProperty | LevelRequirement:
-    reads = list(map(str, spoken_of(stated)))
     if stated.monitor is not None:
-        names = dict.fromkeys(name.removeprefix(BEFORE) for name in reads)
-        return LevelRequirement(level, Watch(stated), {name: sign.index[name] for name in names})
+        return LevelRequirement(level, watch_of(stated, sign))
+    reads = list(map(str, spoken_of(stated)))
     now = {name: sign.index[name] for name in reads if not name.startswith(BEFORE)}
     before = {name: sign.index[name.removeprefix(BEFORE)] for name in reads if name.startswith(BEFORE)}
     return LevelProperty(level, stated, now, before)

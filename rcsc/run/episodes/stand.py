@@ -10,14 +10,12 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
-from rcsc.base.diagnostics.codes import Code
 from rcsc.code.testing.executors.edges import leaf_edges, outside
 from rcsc.lang.model import Admit, Program, Scalar, Value, Variable, VariableName, value_of_key
-from rcsc.lang.project import load
-from rcsc.lang.resolve import resolve
 from rcsc.lang.restart import NUMBER, PROTOCOL, After
-from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.run.description import Description, description, places
 from rcsc.run.faults import faults_of
+from rcsc.run.log.required import program_of
 from rcsc.run.orders.roles import Served, field_of, ordered
 from rcsc.run.orders.script import OutsideBuffer, outside_buffers
 from rcsc.run.plant.load import chosen
@@ -134,28 +132,13 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
     system = description(path)
     system = replace(system, generated=generated or system.generated)
     signs = signatures(system)
-    programs = {spec.name: _program(path, spec.program) for spec in system.levels}
+    programs = {spec.name: program_of(path, spec.program) for spec in system.levels}
     edges = {name: _edges(program) for name, program in programs.items()}
     buffers = outside_buffers(system, signs)
     return Stand(
         path, system, signs, programs, ordered(system, signs), tuple(wire.source for wire in system.wires),
         buffers, edges, tuple(_fields(system, buffers, programs, edges)), files,
     )  # fmt: skip
-
-
-def _program(path: Path, name: str) -> Program:
-    """Return a resolved program. Raises BadDescription: its source is not there, or not in order."""
-    tried = places(path, name)
-    root = next((place for place in tried if place.is_file()), None)
-    if root is None:
-        shown = " nor ".join(f"`{place}`" for place in tried)
-        raise BadDescription(f"the source of program `{name}` is neither {shown}")
-    loaded = load([str(root)])
-    program = resolve(loaded.roots[0], loaded) if loaded.roots else ()
-    if isinstance(program, Program):
-        return program
-    wrong = [found for found in (*loaded.diagnostics, *program) if found.code is not Code.PROPERTY_ELSEWHERE]
-    raise BadDescription(f"program `{name}`: {wrong[0].message if wrong else 'its source cannot be read'}")
 
 
 def _edges(program: Program) -> dict[str, tuple[Value, ...]]:

@@ -97,13 +97,15 @@ def known_name(name: str, known: Iterable[str]) -> str | None:
     return name if name in every else next((word for word in every if normal(word) == normal(name)), None)
 
 
-def predicate(text: str, levels: "Iterable[RunningLevel | LoggedLevel]") -> Predicate:
-    """Return what the text asks of levels that it names.
+def predicate(
+    text: str, levels: "Iterable[RunningLevel | LoggedLevel]", more: Mapping[str, Column] | None = None
+) -> Predicate:
+    """Return what the text asks of levels that it names; `more` are columns beside theirs.
 
     Raises:
         BadCondition: It is no condition, or names what they do not have.
     """
-    known = named_columns(levels)
+    known = {**(more or {}), **named_columns(levels)}
 
     def unknown(name: str) -> BadCondition:
         return BadCondition(

@@ -9,7 +9,7 @@ line that leaves the same values is none.
 """
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -285,12 +285,17 @@ def _again(logged: LoggedLevel, sign: Signature, executor: Executor, unchanged: 
     return _Again(logged, sign, level, executor, sign == logged.sign, sign.packed, aside)
 
 
-def find(log: Log, wanted: Predicate, start: int | None = None) -> int | None:
-    """The first tick from `start` on in which the recorded values are as wanted; None for none."""
+def find(
+    log: Log,
+    wanted: Predicate,
+    start: int | None = None,
+    more: Callable[[int], Mapping[str, Values]] = lambda _: {},
+) -> int | None:
+    """The first tick from `start` on in which the recorded values are as wanted; None for none. `more` gives values beside them."""
     for tick in log.ticks if start is None else range(max(start, log.first + 1), log.last + 1):
         moment = {
             level.name: values for level in log.levels if (values := level.track.latest(tick)) is not None
         }
-        if wanted(moment):
+        if wanted({**moment, **more(tick)}):
             return tick
     return None

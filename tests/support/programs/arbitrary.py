@@ -412,6 +412,7 @@ def _requirements() -> SearchStrategy[tree.Declaration]:
             times if timing in timed else none,
             expressions() if timing in stopped else none,
             expressions() if scope in of_two else none,
+            monitored=st.booleans(),
             **_REQUIRED,
         )
 

@@ -13,6 +13,7 @@ from rcsc.run.description import BadDescription, description
 from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, read
 from rcsc.run.log.replay import Replay, ReplayedCycle, ReplayMoment, find
+from rcsc.run.log.required import kept_columns, requirements
 from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, witness_in_words, words
 
 
@@ -25,7 +26,8 @@ Examples:
   rcsc replay run.mcap --executor python        with the Python executors
   rcsc replay run.mcap --generated edited       what would other tables have done?
   rcsc replay run.mcap --at 120 --show task     one cycle, and a level's whole state
-  rcsc replay run.mcap --find "task.cur_state = state_3 and not task.idle" """,
+  rcsc replay run.mcap --find "task.cur_state = state_3 and not task.idle"
+  rcsc replay run.mcap --find "not task.answered"   the cycle that breaks a requirement""",
 )
 @FILE
 @click.option("--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,
@@ -48,7 +50,7 @@ def command(
     and the exit status is 1.
     """
     log = read(file)
-    tick = _wanted(log, at, find_)
+    tick = _wanted(log, at, find_, _system_of(log, file) if system is None else system_path(system))
     if level is not None and level not in {logged.name for logged in log.levels}:
         raise click.BadParameter(f"there is no level `{level}` in this log", param_hint="--show")
     folder = _executors_of(log, file, system) if generated is None else generated
@@ -98,11 +100,15 @@ def _system_of(log: Log, file: Path) -> Path | None:
     return None
 
 
-def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:
-    """Return the tick to show; None for all, 0 where no tick fits."""
+def _wanted(log: Log, at: int | None, find_: str | None, system: Path | None) -> int | None:
+    """Return the tick to show; None for all, 0 where no tick fits. What is looked for may name requirements of the system's tables."""
     if at is not None and at not in log.ticks:
         raise click.BadParameter(f"the log holds cycles {log.first + 1} to {log.last}", param_hint="--at")
-    return at if find_ is None else find(log, predicate(find_, log.levels), at) or 0
+    if find_ is None:
+        return at
+    wanted = {} if system is None else requirements(system, description(system), monitored=False)
+    columns, values = kept_columns(log, wanted)
+    return find(log, predicate(find_, log.levels, columns), at, values) or 0
 
 
 def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None:

@@ -17,7 +17,7 @@ from rcsc.base.host.files.read import content, json_of
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
-from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped
+from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped, attach, say_error
 from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
 from rcsc.front.commands.systems.studio import serve
 from rcsc.lang.project import project_root
@@ -210,7 +210,25 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
             raise _interrupted(run, log) from error
     if asked.report is not None:
         _write_report(asked.report, witness, log, asked, seconds)
-    return _closing(witness, stage.resume, asked, seconds, log)
+    broken = _watched(asked, log)
+    return _closing(witness, stage.resume, asked, seconds, log) or int(broken)
+
+
+def _watched(asked: RunOptions, log: Path) -> bool:
+    """Say the first cycle that breaks each requirement that every run watches; return whether there is one."""
+    from rcsc.run.log.read import read
+    from rcsc.run.log.required import BrokenRequirement, broken_in, requirements
+
+    wanted = requirements(asked.path, description(asked.path), monitored=True)
+    first: dict[tuple[str, str], BrokenRequirement] = {}
+    for one in broken_in(read(log), wanted) if wanted else ():
+        first.setdefault((one.level, one.name), one)
+    for one in sorted(first.values(), key=lambda one: one.tick):
+        message = f"level `{one.level}`, cycle {one.tick}: requirement `{one.name}` is broken: {one.shown}"
+        say_error(Code.PROPERTY_BROKEN, message)
+        attach("note", f"it says: {one.text}")
+        attach("help", f'rcsc replay {shlex.quote(str(log))} --find "not {one.level}.{one.name}"')
+    return bool(first)
 
 
 def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, resumes: bool) -> None:
@@ -337,6 +355,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
         course = Course(asked.in_step, log, asked.most, asked.path, faults, asked.order.faults)
         ends = _rows_apart(asked, system, course, (from_row or 1) - 1, folder / "results")
     _recorded_apart(asked, system, ends, log, time.perf_counter() - begun)
+    broken = _watched(asked, log)
     if ends and ends[-1][2] != "done":
         number, text, state, reason, _ = ends[-1]
         raise Stopped(
@@ -350,7 +369,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
         if asked.most is not None:
             why = f"row {row} did not end in {asked.most} cycles"
         raise Stopped(Code.SCRIPT_STOPPED, why)
-    return 0
+    return int(broken)
 
 
 def _recorded_apart(

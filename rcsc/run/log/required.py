@@ -1,0 +1,141 @@
+"""Requirements over time, watched in a run: of a log, cycle by cycle, and of whatever else gives a level's values before and after a cycle.
+
+In: a log, or values; resolved programs. Out: the cycles that break a requirement, with the values that they left. It is the monitor that
+`rcsc prove` proves: executors have no part in it.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rcsc.base.diagnostics.codes import Code
+from rcsc.lang.leaves import spoken_of
+from rcsc.lang.model import BEFORE, Program, Property, Value
+from rcsc.lang.over_time import Watch
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.run.description import BadDescription, Description, places
+from rcsc.run.log.queries import Column
+from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.states import LogColumn
+from rcsc.run.signature import Signature, Values
+
+
+def program_of(system: Path, name: str) -> Program:
+    """Return a program of a system, from its source. Raises BadDescription: that is not there, or not in order."""
+    tried = places(system, name)
+    root = next((place for place in tried if place.is_file()), None)
+    if root is None:
+        shown = " nor ".join(f"`{place}`" for place in tried)
+        raise BadDescription(f"the source of program `{name}` is neither {shown}")
+    loaded = load([str(root)])
+    program = resolve(loaded.roots[0], loaded) if loaded.roots else ()
+    if isinstance(program, Program):
+        return program
+    wrong = [found for found in (*loaded.diagnostics, *program) if found.code is not Code.PROPERTY_ELSEWHERE]
+    raise BadDescription(f"program `{name}`: {wrong[0].message if wrong else 'its source cannot be read'}")
+
+
+@dataclass(slots=True)
+class LevelWatch:
+    """A requirement that is watched on the values of its level.
+
+    Attributes:
+        reads: Where what it reads stands among them.
+    """
+
+    watch: Watch
+    sign: Signature
+    reads: Mapping[str, int]
+
+    @property
+    def stated(self) -> Property:
+        """The requirement."""
+        return self.watch.stated
+
+    def broken(self, before: Values, after: Values) -> str:
+        """Take a cycle; return the values that it left, in words, if it breaks the requirement; else ""."""
+        if self.watch.keeps(self._of(before), self._of(after)):
+            return ""
+        leaves = self.sign.leaves
+        return (
+            ", ".join(f"`{name}` = {leaves[at].shown(after[at])}" for name, at in self.reads.items())
+            or "at any values"
+        )
+
+    def _of(self, values: Values) -> dict[str, Value]:
+        return {name: values[at] for name, at in self.reads.items()}
+
+
+def watch_of(stated: Property, sign: Signature) -> LevelWatch:
+    """Return how a requirement is watched on values of a level; raises KeyError where these lack what it reads."""
+    names = dict.fromkeys(name.removeprefix(BEFORE) for name in spoken_of(stated))
+    return LevelWatch(Watch(stated), sign, {name: sign.index[name] for name in names})
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenRequirement:
+    """A cycle of a level that breaks a requirement; `shown`, the values that it left."""
+
+    level: str
+    name: str
+    tick: int
+    text: str
+    shown: str
+
+
+def requirements(system: Path, described: Description, *, monitored: bool) -> dict[str, tuple[Property, ...]]:
+    """Return the requirements over time of each level of a system that has some, all or those that every run watches.
+
+    Raises:
+        BadDescription: A program is not there, or not in order.
+    """
+    known: dict[str, tuple[Property, ...]] = {}
+    for spec in described.levels:
+        every = program_of(system, spec.program).properties
+        known[spec.name] = tuple(one for one in every if one.monitor and (one.monitored or not monitored))
+    return {level: stated for level, stated in known.items() if stated}
+
+
+def broken_in(log: Log, wanted: Mapping[str, tuple[Property, ...]]) -> Iterator[BrokenRequirement]:
+    """Yield each cycle of a log that breaks one of the requirements, level by level; one that reads what the log lacks is left out."""
+    for level in log.levels:
+        known = (stated for stated in wanted.get(level.name, ()) if _is_read(stated, level.sign))
+        watches = [watch_of(stated, level.sign) for stated in known]
+        yield from _broken_of(level, watches)
+
+
+def _is_read(stated: Property, sign: Signature) -> bool:
+    return all(name.removeprefix(BEFORE) in sign.index for name in spoken_of(stated))
+
+
+def _broken_of(level: LoggedLevel, watches: list[LevelWatch]) -> Iterator[BrokenRequirement]:
+    before: Values = ()
+    for at, (tick, values) in enumerate(level.track if watches else ()):
+        restart = level.restarted(at) if at else None
+        if restart is not None:
+            before = restart.values
+        for watch in watches if at else ():
+            if not level.follows(at) or (restart is not None and not restart.by_hand):
+                watch.watch.begin()  # begun anew, or nobody knows what was in between
+            if shown := watch.broken(before, values):
+                yield BrokenRequirement(level.name, watch.stated.name, tick, watch.stated.text, shown)
+        before = values
+
+
+def kept_columns(
+    log: Log, wanted: Mapping[str, tuple[Property, ...]]
+) -> tuple[dict[str, Column], Callable[[int], Mapping[str, Values]]]:
+    """Return a column for each requirement, false in the cycles that break it, and what gives their values in a tick."""
+    broken = {(one.level, one.name, one.tick) for one in broken_in(log, wanted)}
+    every = [(level, stated.name) for level, each in wanted.items() for stated in each]
+
+    def column(at: int, name: str) -> LogColumn:
+        return LogColumn(name, (), "bool", "", lambda values: values[at])
+
+    columns = {f"{level}.{name}": (_KEPT, column(at, name)) for at, (level, name) in enumerate(every)}
+    return columns, lambda tick: {_KEPT: tuple((*one, tick) not in broken for one in every)}
+
+
+_KEPT = "requirements that are kept"
+"""As the name of a level that none has, of their values in a tick."""

@@ -1,0 +1,137 @@
+"""Requirements are watched in runs by the monitor that is proved: in a log, in a run in processes, in a campaign."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rcsc.front.commands import run as rcsc
+from rcsc.lang.model import Program
+from rcsc.run.description import description
+from rcsc.run.log.read import read
+from rcsc.run.log.required import broken_in, program_of, requirements
+
+DOOR = """\
+input asked : bool
+output given : bool
+state waited : int 0 .. 3
+requirement in_time monitored : when asked, within 1 cycles, given
+requirement some_time : when asked, within 3 cycles, given or not asked
+requirement rare : at least 30 [ms] apart, given
+table t {
+  | line | asked | waited || given | waited     |
+  |------|-------|--------||-------|------------|
+  | wait | true  | < 2    || false | waited + 1 |
+  | give | true  | >= 2   || true  | 0          |
+  | idle | false |        || false | 0          |
+}
+level l { period 10 [ms] table t }
+"""
+SYSTEM = """\
+name = "door"
+tick_ms = 10
+generated = "generated"
+[[level]]
+name = "l"
+program = "door"
+[buffers]
+"world.asked" = "l.asked"
+"l.given" = "world.given"
+[plant]
+python = "plant.py"
+"""
+PLANT = """\
+class World:
+    asked: bool = False
+    given: bool = False
+    tick: int = 0
+
+    def step(self, seconds: float) -> None:
+        self.tick += 1
+        self.asked = 5 <= self.tick < 9
+"""
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> Path:
+    for name, text in (("door.rcs", DOOR), ("system.toml", SYSTEM), ("plant.py", PLANT)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    out, err = capsys.readouterr()
+    return out + err
+
+
+def test_a_run_says_which_cycle_breaks_a_requirement_and_replay_finds_it(
+    system: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The order is taken in cycle 6, and is to be answered in cycle 7; only what is `monitored` is said by itself."""
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python"]) == 1
+    text = said(capsys)
+    assert re.findall(r"cycle (\d+): requirement `(\w+)`", text) == [("7", "in_time")]
+    assert "it says: when asked, within 1 cycles, given" in text
+    log = str(system / ".rcsc-cache" / "door.mcap")
+    replay = ["replay", log, "--system", str(system), "--executor", "python", "--find"]
+    assert rcsc([*replay, "not l.in_time"]) == 0
+    assert said(capsys).startswith("cycle 7,")
+    assert rcsc([*replay, "not l.some_time or not l.rare"]) == 1
+    assert "holds in no cycle" in said(capsys)
+    assert rcsc([*replay, "not l.in_time and l.given"]) == 1
+
+
+def test_a_run_that_keeps_what_is_watched_is_no_finding(
+    system: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = DOOR.replace("within 1 cycles, given", "within 2 cycles, given")
+    (system / "door.rcs").write_text(kept, encoding="utf-8")
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python"]) == 0
+    assert "requirement" not in said(capsys)
+
+
+def test_processes_watch_the_same(system: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--cycles", "20", "--executor", "python", "--processes", "--in-step", "--rate", "20"]
+    assert rcsc(["run", str(system), *options]) == 1
+    assert re.findall(r"cycle (\d+): requirement `(\w+)`", said(capsys)) == [("7", "in_time")]
+
+
+def test_a_campaign_watches_every_requirement_and_names_the_cycle(
+    system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [
+        "campaign",
+        str(system),
+        "--episodes",
+        "4",
+        "--seed",
+        "1",
+        "--executor",
+        "python",
+        "--workers",
+        "1",
+    ]
+    assert rcsc([*command, "--save", str(tmp_path / "found")]) == 1
+    text = said(capsys)
+    assert "`l: in_time` does not hold: `when asked, within 1 cycles, given` is broken in line `wait`" in text
+    assert "l: some_time" not in text
+
+
+def test_what_a_log_lacks_is_not_looked_at_and_programs_are_read_from_their_source(
+    system: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python", "-q"]) == 1
+    said(capsys)
+    log = read(system / ".rcsc-cache" / "door.mcap")
+    path = system / "system.toml"
+    assert isinstance(program_of(path, "door"), Program)
+    every = requirements(path, description(path), monitored=False)
+    assert [one.name for one in every["l"]] == ["in_time", "some_time", "rare"]
+    assert [(one.name, one.tick) for one in broken_in(log, every)] == [("in_time", 7)]
+    newer = DOOR.replace(
+        "requirement rare", "state more : bool\nrequirement more_ : always more\nrequirement rare"
+    )
+    (system / "door.rcs").write_text(newer, encoding="utf-8")
+    assert [
+        (one.name, one.tick) for one in broken_in(log, requirements(path, description(path), monitored=False))
+    ] == [("in_time", 7)]
