@@ -13,8 +13,9 @@ What is proved of each level, alone in its environment (`proof.level`):
   numbers, and numbers come one after the other;
 - of a level by hand, that *done* and *failed* stay (others state it as properties): no proof of a neighbour takes it for granted.
 
-Context: which lines are never reached, and what a line does when it matches again (`proof.context`). Termination: every command is
-eventually answered, assuming that subordinates answer theirs (`proof.termination`, `proof.ranking`).
+Context: which lines are never reached, and what a line does when it matches again (`proof.context`); which states nothing leaves
+(`proof.stuck`). Termination: every command is eventually answered, assuming that subordinates answer theirs (`proof.termination`,
+`proof.ranking`).
 
 What a level assumes of its environment is the contract (`transition`):
 

@@ -1850,6 +1850,31 @@ class Code(StrEnum):
     initial ones. The text is not of this form, names a variable that no level has, or that several have (write `level.variable`), a
     value outside its range, or values that an invariant excludes. No verdict depends on it.
     """
+    LINE_NEVER_REACHED = """RCS758: a line is never reached in its system
+
+    `rcsc prove` shows of the level in its environment, whatever comes, that no cycle runs the line: the cells that are marked never hold
+    where the table runs, or never together. Where that is about a value of the level's own, the lines that would bring it about are named.
+    Often a line that should lead there was forgotten. A line that is there in case of a fault may stay; `--strict` counts it. Where no line
+    of a table runs, nothing selects the table.
+
+        enum mode { waiting, levelling }
+        input call : bool
+        state now : mode = waiting
+        table lift {
+          | line  | now       | call  || now     |
+          | idle  | waiting   | false ||         |
+          | goes  | waiting   | true  || waiting |
+          | level | levelling |       || waiting |
+        }
+    """
+    NEVER_LEFT = """RCS759: a state that nothing leaves
+
+    An enumeration that the level keeps, and that its lines test, can come to the values that are named, from the lines that are marked,
+    and then has one of them for ever, whatever comes: no line that matches there writes another one, or those that would are never reached
+    there. Only a restart leaves it. A state that waits for an order is none, as the next one leaves it. Where it is meant to be final, say
+    so in a property over two cycles, which is proved with the others: `property broken_stays : now = broken then now = broken`. Without
+    that `--strict` counts it.
+    """
     GRAPH_NO_STATE = """RCS771: a table has no state to draw
 
     `rcsc graph` draws the values of one variable as states: `cur_state`, else the only enumeration that the table tests and keeps as

@@ -57,7 +57,7 @@ class FoundInvariant:
         clauses: The invariant: cubes that never hold.
         open: Obligations searched for, by position, for which the predicates do not suffice.
         walked: States seen on walks; `learnt`, those that the solver added.
-        ran: Tables and lines that ran on walks; `states`, the states after their cycles.
+        ran: Tables and lines that ran on walks, each with a state after it; `states`, the states after all cycles.
     """
 
     predicates: tuple[Predicate, ...] = ()
@@ -65,7 +65,7 @@ class FoundInvariant:
     open: frozenset[int] = frozenset()
     walked: int = 0
     learnt: int = 0
-    ran: frozenset[tuple[str, str]] = frozenset()
+    ran: Mapping[tuple[str, str], Mapping[str, Value]] = field(default_factory=dict, repr=False)
     states: tuple[Mapping[str, Value], ...] = field(default=(), repr=False)
 
     @property
@@ -174,18 +174,16 @@ def read(cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
 
 def _walked(
     ts: TransitionSystem, effort: Effort
-) -> tuple[tuple[Mapping[str, Value], ...], frozenset[tuple[str, str]]]:
-    """Collect states that walks reach, and the lines that ran; none if assumptions are trusted, since walks do not keep to them.
+) -> tuple[tuple[Mapping[str, Value], ...], dict[tuple[str, str], Mapping[str, Value]]]:
+    """Collect states that walks reach, and the lines that ran, each with a state after it.
 
     Most walks continue from where one reached a line for the first time, as coverage guides a fuzzer (Zalewski, "american fuzzy
     lop", 2013). So they reach lines that need a long run of answers.
     """
-    if ts.trusted or ts.links.given:
-        return (), frozenset()
     random = Random(0)  # noqa: S311  # repeatable on purpose
     states: dict[tuple[Value, ...], Mapping[str, Value]] = {}
     new: list[Mapping[str, Value]] = []
-    ran: set[tuple[str, str]] = set()
+    ran: dict[tuple[str, str], Mapping[str, Value]] = {}
     many = max(1, effort.walks, A_TABLE * len(ts.program.tables)) * effort.cycles // BURST
     least = most = many
     at = 0
@@ -195,9 +193,9 @@ def _walked(
             walk.begin_at(new[max(random.randrange(len(new)), random.randrange(len(new)))])
         for state in walk.states(BURST):
             states.setdefault(tuple(state.values()), state)
-            if walk.ran - ran:
-                ran |= walk.ran
+            if found := walk.ran - ran.keys():
+                ran |= dict.fromkeys(found, state)
                 new.append(state)
                 most = min(LONGER * least, at + many)
         at += 1
-    return tuple(states.values()), frozenset(ran)
+    return tuple(states.values()), ran

@@ -7,20 +7,23 @@ In: a transition system, and what was confirmed of it. Out: a `Context`:
 - *repeated*: leaves that a line changes which gives an order and then matches again, on the same inputs, before the order is echoed.
   Section 9 requires that there are none: each line does the same until its command is echoed.
 - *restless*: whether the level would give order after order on constant inputs.
+- *never*, *traps*: why lines are never reached, and which states nothing leaves (`stuck`).
 
 Each question is answered by Z3 from the invariant; what is not refuted is named, so the lists are never too short.
 """
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.walk import reached_further
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
+from rcsc.compose.proof.stuck import NeverReached, Trap, traps, why_never
 from rcsc.lang.leaves import may_write
-from rcsc.lang.model import Bool, Default, Kind
+from rcsc.lang.model import Bool, Default, Kind, Value
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.search import halved
 from rcsc.proof.solvers.smt import Answer, Solver, Term
@@ -44,6 +47,7 @@ class Context:
     Attributes:
         unreached: Tables and lines that no reachable cycle runs; `unsure`, those neither shown to be so nor seen to run.
         orders: Whether the level gives orders; else nothing is repeated.
+        never: Why the unreached lines are; `traps`, states that nothing leaves.
     """
 
     unreached: tuple[tuple[str, str], ...]
@@ -51,6 +55,8 @@ class Context:
     restless: bool
     unsure: tuple[tuple[str, str], ...] = ()
     orders: bool = True
+    never: tuple[NeverReached, ...] = ()
+    traps: tuple[Trap, ...] = ()
 
 
 LineName: TypeAlias = tuple[str, str]
@@ -70,20 +76,25 @@ def context(
     ts: TransitionSystem,
     asked: Confirmation,
     clauses: Sequence[Clause],
-    ran: Container[LineName] = frozenset(),
+    ran: Mapping[LineName, Mapping[str, Value]] | None = None,
 ) -> Context:
-    """Ask all three questions; lines that `ran` on walks are known to be reached."""
+    """Ask all questions; lines that `ran` on walks, each with a state after it, are known to be reached. Without walks none is sought."""
+    walked, ran = ran is not None, ran or {}
     every = list(_starts(ts, asked, clauses))
     asked.rested_on += [start.solver for start in every]
     reached = {line for start in every for line in _reached(asked, start, ran)}
     lines = [line for line, _ in _lines(every[0].cycle)]
     unreached = tuple(line for line in lines if line not in ran and line not in reached)
+    unsure = [line for line in lines if line not in unreached and line not in ran]
+    further = reached_further(ts, unsure, ran) if walked and unsure else set()
     return Context(
         unreached,
         tuple(_every_repeated(ts, asked, every)),
         any(_restless(ts, asked, start) for start in every),
-        tuple(line for line in lines if line not in unreached and line not in ran),
+        tuple(line for line in unsure if line not in further),
         bool(ts.links.below),
+        tuple(why_never(ts, asked, clauses, unreached)),
+        tuple(traps(ts, asked, clauses, {*ran, *further})),
     )
 
 

@@ -283,9 +283,7 @@ def _confirmed_of(
     """
     asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits, exact=exact)
     # no line in context and no ending goes by these
-    aside = {Sort.NUMBERED, Sort.DONE_STAYS, Sort.FAILED_STAYS} | (
-        {Sort.PROPERTY, Sort.REQUIREMENT} if ts.refuses else set()
-    )
+    aside = {Sort.NUMBERED, Sort.DONE_STAYS, Sort.FAILED_STAYS, Sort.PROPERTY, Sort.REQUIREMENT}
     looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
     flow = Flow(ts, asked, invariant.clauses)
     if looks and (

@@ -27,6 +27,7 @@ from rcsc.compose.contract.transition import Leaves, TransitionSystem
 from rcsc.compose.proof.assume_guarantee import not_for_ever
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.notices import condition_of
 from rcsc.compose.proof.ranking import RisingLine
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.proof.termination import Ending
@@ -74,6 +75,11 @@ def in_context(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> I
     yield from (f"  {name}: {verdict}" for name, verdict in never if verdict != "proved")
     if seen.unsure:
         yield f"not shown whether reached: {', '.join(' '.join(at) for at in seen.unsure)}"
+    yield from (
+        f"stays for ever once it is so: {condition_of(trap)}"
+        + (f", as `{trap.stated}` says" if trap.stated else "")
+        for trap in seen.traps
+    )
     if seen.orders:
         yield from _again(whole, proof.level, seen)
     if proof.endings:
@@ -188,8 +194,9 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
         "resting on unproved ones": sum(map(len, _resting(whole).values())),
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),
+        "never left": sum(not trap.stated for seen in contexts for trap in seen.traps),
     }
-    nouns = {"not shown to end": "command", "never reached": "line"}
+    nouns = {"not shown to end": "command", "never reached": "line", "never left": "state"}
     return (f"{counted(many, nouns.get(what, 'claim'))} {what}" for what, many in counts.items() if many)
 
 

@@ -9,6 +9,9 @@ from typing import Any
 import click
 
 from rcsc.base.diagnostics.codes import Code
+from rcsc.base.diagnostics.jsonform import diagnostic_to_json
+from rcsc.base.diagnostics.render import full, paint, plain
+from rcsc.base.diagnostics.source import Sources
 from rcsc.base.host.cache import Cache
 from rcsc.base.host.files import write_atomically
 from rcsc.compose.contract.beginning import BadStartError, Starts, starts
@@ -22,6 +25,7 @@ from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.invariant.cubes import as_condition, shown
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.notices import notices
 from rcsc.compose.proof.system import (
     SystemProof,
     lines_in,
@@ -47,7 +51,7 @@ from rcsc.front.commands.shared.proved import (
     trusted,
     trusting,
 )
-from rcsc.front.commands.shared.show import Progress, UnwritableError
+from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, wants_color
 from rcsc.front.commands.shared.stopped import say_error
 from rcsc.front.commands.systems.explained import explanation_as_json, say_explanation
 from rcsc.lang.model import Kind
@@ -90,6 +94,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     """
     stood = digest_at(str(path))
     systems, loaded = read_systems(path)
+    sources = {file: source for files in loaded.values() for file, source in files.sources.items()}
     unknown = [name for name in asked.only if name not in systems]
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
@@ -113,10 +118,10 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     if asked.certificate is not None:
         _write(asked.certificate, systems, proof)
     if not asked.as_json:
-        _say(_lines(path, systems, proof, asked))
+        _say(_lines(path, systems, proof, asked, sources))
     explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
-        _say(_lines(path, systems, proof, asked, explanations))
+        _say(_lines(path, systems, proof, asked, sources, explanations))
     for agreement in (each for each in proof.agreements if not each.holds):
         say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
@@ -125,7 +130,9 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
     status = max(status, summary(proof).status(strict=asked.strict))
     if cache is not None and not status and not explanations:
-        keep_lines(cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked)), stood, loaded)
+        keep_lines(
+            cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked, sources)), stood, loaded
+        )
     return status
 
 
@@ -144,11 +151,12 @@ def _lines(
     systems: dict[str, TransitionSystem],
     proof: SystemProof,
     asked: Asked,
+    sources: Sources,
     explanations: Sequence[Explanation] = (),
 ) -> Iterator[str]:
     """Yield the lines to print of a proof; explanations are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
-        yield json.dumps(_as_json(proof, systems, explanations), indent=2)
+        yield json.dumps(_as_json(proof, systems, sources, explanations), indent=2)
         return
     yield summary(proof).line(strict=asked.strict)
     for level_proof in proof.levels:
@@ -158,6 +166,9 @@ def _lines(
     yield from _agreements(proof)
     yield from _whole(systems, proof)
     yield from _unconnected(systems, description(path))
+    for notice in notices(systems, proof):
+        rows = full(notice, sources)
+        yield (paint(rows) if wants_color(Color.AUTO, None) else plain(rows)).rstrip("\n")
 
 
 class _LevelProgress:
@@ -360,13 +371,17 @@ def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProo
 
 
 def _as_json(
-    proof: SystemProof, systems: dict[str, TransitionSystem], explanations: Sequence[Explanation]
+    proof: SystemProof,
+    systems: dict[str, TransitionSystem],
+    sources: Sources,
+    explanations: Sequence[Explanation],
 ) -> dict[str, Any]:
     return {
         "proved": proof.proved,
         "whole": proof.whole,
         "counts": asdict(summary(proof)),
         "findings": [explanation_as_json(systems, explanation) for explanation in explanations],
+        "notices": [diagnostic_to_json(notice, sources) for notice in notices(systems, proof)],
         "levels": [
             {
                 "level": level.level,
