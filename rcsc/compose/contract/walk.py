@@ -22,7 +22,7 @@ TRIES = 8
 """How often inputs are drawn for one cycle, until what is taken for granted of them is so."""
 DEEPER = 100_000
 """Leaves times cycles of walks to lines that random ones do not reach: thousands of cycles of a small level, hundreds of a large one."""
-HELD, DRAWN = 2_000, 12
+HELD, DRAWN = 5_000, 12
 """From a state that a new line left: the most cycles of a walk that holds its inputs, and how often two cycles are drawn instead."""
 
 

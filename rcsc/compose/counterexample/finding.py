@@ -3,8 +3,9 @@
 In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
@@ -124,6 +125,40 @@ class TimeLineRow:
     def ran(self) -> tuple[str, ...]:
         """Return every table with its line, in order."""
         return tuple(f"{table}: {line}" for table, line in (*self.before, (self.table, self.line)))
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """The rows of one tick, for folding (`alike`)."""
+
+    rows: tuple[TimeLineRow, ...]
+
+    @property
+    def number(self) -> int:
+        """The tick, from 1."""
+        return self.rows[0].tick
+
+    @property
+    def ran(self) -> tuple[tuple[str, tuple[str, ...]], ...] | None:
+        """The lines of each level; None where something was taken, or went wrong."""
+        if any(row.takes or row.wrong or not row.tick for row in self.rows):
+            return None
+        return tuple((row.level, row.ran) for row in self.rows)
+
+    @property
+    def moved(self) -> dict[str, str]:
+        """What the levels changed, by level and leaf."""
+        several = len(self.rows) > 1
+        return {
+            f"{row.level}.{name}" if several else name: said
+            for row in self.rows
+            for name, said in row.leaves.items()
+        }
+
+
+def by_tick(shown: Sequence[TimeLineRow]) -> list[Tick]:
+    """Put together the rows of each tick."""
+    return [Tick(tuple(of)) for _, of in groupby(shown, key=lambda row: row.tick)]
 
 
 RESTART, BEGINS = "restart", "begins"

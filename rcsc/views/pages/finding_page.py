@@ -1,13 +1,14 @@
-"""A finding as a page: one frame a tick, in each its levels as boxes from the top down and the cell as far as the log says it.
+"""A finding as a page: one frame a tick, or for ticks that are alike; in each its levels as boxes, and the cell as far as the log says it.
 
 In: a log that keeps a finding, and the cell where there is one to be drawn. Out: one HTML file that needs nothing else; the same text for
 the same log and cell.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.base.diagnostics.alike import Alike, folded
 from rcsc.base.host.files import write_atomically
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
@@ -32,6 +33,27 @@ class _Tick:
     broken: bool
     drawn: Drawing | None
 
+    @property
+    def ran(self) -> Hashable | None:
+        """What has to be the same of a tick that is folded with this one; None where it is to be shown by itself."""
+        boxes = self.frame.boxes
+        if self.mark or self.drawn is not None or any(box.inputs or box.wrong for box in boxes):
+            return None
+        return tuple(
+            replace(box, states=tuple(state for state in box.states if state.before == state.now))
+            for box in boxes
+        )
+
+    @property
+    def moved(self) -> dict[str, str]:
+        """What its levels changed, by level and variable."""
+        return {
+            f"{box.level}.{state.name}": state.now
+            for box in self.frame.boxes
+            for state in box.states
+            if state.before != state.now
+        }
+
 
 def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> None:
     """Write the page.
@@ -51,9 +73,10 @@ def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, 
 
 def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> str:
     """Return the page; arguments are as in `trace`."""
+    ticks = [_tick(frame, log, finding, cell) for frame in frames(log)]
     return PAGES.get_template("trace.html.jinja").render(
         finding=finding,
-        ticks=[_tick(frame, log, finding, cell) for frame in frames(log)],
+        ticks=[(isinstance(tick, Alike), tick) for tick in folded(ticks)],
         notes=_notes(log, finding),
         cell=about_cell(cell, why_not),
         sign=_SIGNS,

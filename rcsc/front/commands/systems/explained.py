@@ -3,8 +3,7 @@
 import io
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
-from itertools import groupby
+from dataclasses import asdict
 from typing import Any
 
 import click
@@ -12,12 +11,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from rcsc.base.diagnostics.alike import Alike, folded
 from rcsc.base.diagnostics.codes import Code
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, runs_on_executors
-from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, rows
+from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, by_tick, rows
 from rcsc.front.commands.shared.stopped import attach, say_error
 
 ALIKE = 2
@@ -26,8 +26,6 @@ _WIDTH = 118
 """Columns of a time line."""
 _LONG = 33
 """Characters of an assignment that a column has room for, whatever the others hold."""
-FOLDED = 4
-"""More cycles than so many that do alike are shown as one row."""
 _HARD = "\ue000"
 """A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
 
@@ -214,40 +212,29 @@ def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
 
 
 def _time_line(shown: Sequence[TimeLineRow]) -> Table:
-    """Return a table with a row a cycle: the line that matched, the inputs and other values that changed, and what went wrong."""
+    """Return a table with a row a cycle: the line that matched, the inputs and other values that changed, and what went wrong.
+
+    Cycles that are alike take one row.
+    """
     several = len({row.level for row in shown}) > 1
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
         table.add_column(heading, overflow="fold")
-    for cycles, row in [(str(row.tick or ""), row) for row in shown] if several else _folded(shown):
-        takes, leaves = (
-            ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
-            for changed in (row.takes, row.leaves)
-        )
-        ran = "\n".join(row.ran) if row.tick else row.line
-        ran += f"\n! {row.wrong}" if row.wrong else ""
-        table.add_row(cycles, *((row.level,) if several else ()), ran, takes, leaves)
-    return table
-
-
-def _folded(shown: Sequence[TimeLineRow]) -> Iterator[tuple[str, TimeLineRow]]:
-    """Yield the cycles of each row and the row; cycles that run one line and change the same leaves, as a counter does, are one row."""
-    for _, group in groupby(shown, key=_alike):
-        same = list(group)
-        if len(same) <= FOLDED:
-            yield from ((str(row.tick or ""), row) for row in same)
+    for tick in folded(by_tick(shown)):
+        if isinstance(tick, Alike):
+            moved = ", ".join(_unbroken(f"{name} = {value}") for name, value in tick.moved.items())
+            span = f"{tick.first.number} .. {tick.last.number}"
+            table.add_row(span, *(("",) if several else ()), tick.said, "", moved)
             continue
-        first, last = same[0], same[-1]
-        leaves = {
-            name: value if value == last.leaves[name] else f"{value} to {last.leaves[name]}"
-            for name, value in first.leaves.items()
-        }
-        yield f"{first.tick} to {last.tick}", replace(first, leaves=leaves)
-
-
-def _alike(row: TimeLineRow) -> tuple[object, ...]:
-    alone = row.tick if row.takes or row.wrong or not row.tick else 0
-    return alone, row.level, row.ran, tuple(row.leaves)
+        for row in tick.rows:
+            takes, leaves = (
+                ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
+                for changed in (row.takes, row.leaves)
+            )
+            ran = "\n".join(row.ran) if row.tick else row.line
+            ran += f"\n! {row.wrong}" if row.wrong else ""
+            table.add_row(str(row.tick or ""), *((row.level,) if several else ()), ran, takes, leaves)
+    return table
 
 
 def _unbroken(text: str) -> str:
