@@ -638,7 +638,7 @@ class Property:
     standard: bool = field(default=False, compare=False)
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
     monitor: "Monitor | None" = None
-    monitored: bool = field(default=False, compare=False)
+    monitored: bool = field(default=False, repr=False)
 
     @property
     def word(self) -> str:

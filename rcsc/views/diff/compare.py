@@ -84,7 +84,7 @@ def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Comp
     yield "assumptions, invariants and properties", lambda: list(parts.conditions(versions))
 
 
-_APART = frozenset({"table", "level", "property", "preprocess", "postprocess"})
+_APART = frozenset({"table", "level", "property", "requirement", "preprocess", "postprocess"})
 """Parts on which the stopping assumptions of another table do not rest."""
 
 
@@ -149,7 +149,7 @@ def _places(program: Program) -> Iterator[tuple[str, tuple[str, ...]]]:
     yield from ((f"procedure `{one.name}`", one.requirements) for one in program.procedures)
     yield from ((f"assumption `{one.name}`", one.requirements) for one in program.assumptions)
     yield from ((f"invariant `{one.name}`", one.requirements) for one in program.invariants)
-    yield from ((f"property `{one.name}`", one.requirements) for one in program.properties)
+    yield from ((f"{one.word} `{one.name}`", one.requirements) for one in program.properties)
 
 
 def difference(

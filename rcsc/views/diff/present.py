@@ -33,7 +33,9 @@ from rcsc.proof.symbolic.values import Node
 from rcsc.views.diff.changes.difference import Change, ComparedPart, ProgramDifference
 from rcsc.views.diff.changes.tables import assumed
 
-_ELSEWHERE = frozenset({"procedure", "assumption", "invariant", "property", "standing of assumption"})
+_ELSEWHERE = frozenset(
+    {"procedure", "assumption", "invariant", "property", "requirement", "standing of assumption"}
+)
 """Parts that do nothing by themselves: what a changed procedure does is seen in the tables that call it."""
 
 

@@ -345,7 +345,7 @@ class _Build:
         for stated in self.program.properties:
             proof = self.known.properties.get(stated.name, NOT_HERE)
             changing = (line for line, body in self._bodies() if self._changes(body, stated))
-            yield self._named("property", stated, stated.text, changing, proof)
+            yield self._named(stated.word, stated, stated.text, changing, proof)
 
     def _named(
         self,

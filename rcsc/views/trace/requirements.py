@@ -117,7 +117,7 @@ def _lines_of(matrix: Matrix, one: Declared) -> Iterator[TracedLine]:
     """Yield the lines that run a procedure, speak of a property, or are of a table that relies on an assumption."""
     for line in matrix.lines:
         runs = one.sort == "procedure" and one.name in line.procedures
-        speaks = one.sort == "property" and one.name in dict(line.properties)
+        speaks = one.sort in {"property", "requirement"} and one.name in dict(line.properties)
         if runs or speaks or f"table {line.table}" in one.used:
             yield line
 

@@ -196,7 +196,7 @@ _COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
     "procedures": ("procedure", {"body": (), "reads": (), "writes": ()}),
     "assumptions": ("assumption", {"condition": None, "standing": None}),
     "invariants": ("invariant", {"condition": None}),
-    "properties": ("property", {"condition": None, "monitor": None}),
+    "properties": ("property", {"condition": None, "monitor": None, "monitored": None}),
     "tables": (
         "table",
         {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": (), "meetings": ()},
@@ -319,16 +319,25 @@ def _properties(versions: Versions) -> Iterator[ComparedPart]:
     for name in dict.fromkeys((*old, *new)):
         if name not in new or name not in old:
             only = old[name] if name in old else new[name]
-            yield ComparedPart("property", name, (f"{'gone' if name in old else 'new'}: {_words(only)}",))
+            yield ComparedPart(only.word, name, (f"{'gone' if name in old else 'new'}: {_words(only)}",))
             continue
-        if old[name].monitor is not None or new[name].monitor is not None:
-            same = replace(old[name], text="", doc="") == replace(new[name], text="", doc="")
-            apart = [] if same else [f"{_words(old[name])} -> {_words(new[name])}"]
-            yield ComparedPart("property", name, tuple(apart), basis=Basis.DIGEST)
+        pair = old[name], new[name]
+        if any(one.monitor is not None or one.monitored for one in pair):
+            yield _over_time(*pair)
             continue
         part = _condition(versions, "property", name, (old[name].condition, new[name].condition))
         notes = (f"{_words(old[name])} -> {_words(new[name])}",) if part.changes else part.notes
         yield replace(part, notes=notes)
+
+
+def _over_time(old: Property, new: Property) -> ComparedPart:
+    """Compare two requirements over time by what their monitors do."""
+    apart = []
+    if (old.condition, old.monitor) != (new.condition, new.monitor):
+        apart.append(f"{_words(old)} -> {_words(new)}")
+    if old.monitored is not new.monitored:
+        apart.append("monitored, now not" if old.monitored else "now monitored")
+    return ComparedPart(new.word, new.name, tuple(apart), basis=Basis.DIGEST)
 
 
 def _words(stated: Property) -> str:
