@@ -27,7 +27,7 @@ TIMINGS = {
 TIMED = {"within", "for", "after"}
 NAMES = ("m", "c", "s", "p")
 LENGTHS = (1, 2, 3, 5, 9)
-EACH = 40
+EACH = 16
 """Traces of each length."""
 
 

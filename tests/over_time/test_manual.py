@@ -1,0 +1,131 @@
+"""The page on requirements over time: its drawings are run, its examples proved, refuted, or shown never to ask."""
+
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.lang.model import WATCHED
+from rcsc.lang.over_time import Timing, Watch
+from tests.support.programs.stages import program_of
+from tests.support.programs.systems import alone
+
+PAGE = (Path(__file__).parents[2] / "grammar" / "requirements.md").read_text(encoding="utf-8")
+DRAWING = re.compile(r"^```cycles\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+NAMES = ("mode", "asked", "stop", "given")
+PROGRAM = (
+    "".join(f"input {name} : bool\n" for name in NAMES)
+    + """\
+requirement r : {}
+output o : bool
+table t {{
+  | line | mode  || o     |
+  |------|-------||-------|
+  | yes  | true  || true  |
+  | no   | false || false |
+}}
+level l {{ period 10 [ms] table t }}
+"""
+)
+
+
+def drawings() -> Iterator[tuple[str, dict[str, str], str]]:
+    """Yield what each line of each drawing says, the cycles drawn above it, and how it ends."""
+    for drawing in DRAWING.finditer(PAGE):
+        rows: dict[str, str] = {}
+        for line in drawing["text"].splitlines():
+            row = re.fullmatch(r"(\w+) +([.#]( [.#])*)", line)
+            if row is not None:
+                rows[row[1]] = row[2].replace(" ", "")
+            else:
+                said = re.fullmatch(r"(.+?) +(kept|broken in cycle \d+)", line)
+                assert said is not None, line
+                yield said[1].strip(), dict(rows), said[2]
+
+
+@pytest.mark.parametrize(("says", "rows", "ends"), list(drawings()))
+def test_each_drawing_ends_as_it_says(says: str, rows: dict[str, str], ends: str) -> None:
+    [stated] = program_of(PROGRAM.format(says)).properties
+    assert len({len(row) for row in rows.values()}) == 1
+    cycles = [
+        {name: rows.get(name, "........")[at] == "#" for name in NAMES}
+        for at in range(len(next(iter(rows.values()))))
+    ]
+    watch = Watch(stated)
+    good = [watch.keeps(before, after) for before, after in pairwise([dict.fromkeys(NAMES, False), *cycles])]
+    assert ends == ("kept" if all(good) else f"broken in cycle {good.index(False) + 1}")
+
+
+def test_every_timing_and_scope_is_drawn() -> None:
+    said = " ".join(says for says, _, _ in drawings())
+    words = {str(timing) for timing in Timing} | {
+        "while",
+        "unless",
+        "before",
+        "after",
+        "only while",
+        "only before",
+        "only after",
+    }
+    words |= {"between", "from", "when", "whenever", "once", "since", "was", "apart", "on for", "off for"}
+    assert {word for word in words if word not in said} == set()
+
+
+EXAMPLE = re.search(r"^```rcs\n(?P<text>.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+assert EXAMPLE is not None
+SAID = dict(
+    re.findall(
+        r"^requirement (\w+) : .*?# (proved|vacuous|refuted in cycle \d+)$", EXAMPLE["text"], re.MULTILINE
+    )
+)
+
+
+def test_each_example_is_proved_refuted_or_vacuous_as_it_says() -> None:
+    assert EXAMPLE is not None
+    ts = alone(EXAMPLE["text"])
+    assert {one.name for one in ts.program.properties} == SAID.keys()
+    assert {said.split()[0] for said in SAID.values()} == {"proved", "refuted", "vacuous"}
+    proof = prove_level(ts, Effort(walks=6, cycles=40))
+    proved = {
+        owed.name
+        for owed, verdict in proof.verdicts
+        if owed.sort is Sort.REQUIREMENT and verdict is Verdict.PROVED
+    }
+    assert proved == {name for name, said in SAID.items() if not said.startswith("refuted")}
+    wanted = [owed for owed in obligations(ts, ts.cycle(ts.havoc())) if owed.name in SAID]
+    found = traces(ts, wanted, TraceSearch(8))
+    cycles = {key[2]: len(trace.steps) for key, trace in found.items() if isinstance(trace, Trace)}
+    assert cycles == {
+        name: int(said.split()[-1]) for name, said in SAID.items() if said.startswith("refuted")
+    }
+
+
+def test_what_is_vacuous_never_asks_and_all_else_does() -> None:
+    """On long walks, for those that ask: what a walk does not show the proof does, of the others."""
+    assert EXAMPLE is not None
+    ts = alone(EXAMPLE["text"])
+    asks = set[str]()
+    for seed in range(6):
+        for state in Walk(ts, Random(seed)).states(80):  # noqa: S311  # the same walks each time
+            asks |= {
+                name
+                for name in SAID
+                if state.get(f"{WATCHED}{name} asked", state.get(f"{WATCHED}{name} begun"))
+            }
+    assert asks == {name for name, said in SAID.items() if said != "vacuous"}
+    impossible = ("waited = 3", "given and not busy", "given and not asked")
+    nothing = (
+        "".join(f"requirement n{at} : never {what}\n" for at, what in enumerate(impossible, 1)) + "table t {"
+    )
+    never = alone(EXAMPLE["text"].replace("table t {", nothing))
+    proof = prove_level(never, Effort(walks=6, cycles=40))
+    verdicts = {owed.name: verdict for owed, verdict in proof.verdicts}
+    assert {verdicts[name] for name in ("n1", "n2", "n3")} == {Verdict.PROVED}
