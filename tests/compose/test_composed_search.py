@@ -633,7 +633,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         cycle: Cycle,
         wanted: Sequence[Obligation],
         effort: Effort,
-        _: object,
+        *_: object,
     ) -> FoundInvariant:
         found = search(ts, firsts, cycle, wanted, effort)
         names = [predicate.name for predicate in found.predicates]

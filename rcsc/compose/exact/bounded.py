@@ -9,11 +9,11 @@ from rcsc.compose.contract.obligations import ObligationKey
 from rcsc.compose.exact.circuit import Circuit
 from rcsc.compose.exact.explicit import Run
 from rcsc.compose.exact.unrolled import Unrolled
-from rcsc.proof.solvers.sat import GaveUpError
-from rcsc.proof.symbolic.bits import FALSE
+from rcsc.proof.solvers.sat import GaveUpError, Sat
+from rcsc.proof.symbolic.bits import FALSE, TRUE
 
-MOST_GATES = 4_000_000
-"""Gates of all cycles together: an effort that is the same on every machine."""
+MOST_GATES, MOST_CONFLICTS = 500_000, 2_000
+"""Gates of all cycles together, and conflicts of a solver: an effort that is the same on every machine."""
 
 
 @dataclass(slots=True)
@@ -32,7 +32,10 @@ class Looked:
 def looked(circuit: Circuit, most: int) -> Looked:
     """Search runs of at most so many cycles, and of at most so many gates in all."""
     found = Looked()
-    every = [Unrolled(circuit, number) for number in range(len(circuit.firsts))]
+    every = [
+        Unrolled(circuit, number, Sat([[TRUE]], conflicts=MOST_CONFLICTS))
+        for number in range(len(circuit.firsts))
+    ]
     size = len(circuit.needed(circuit.step.outputs)) * len(every)
     try:
         for cycles in range(1, min(most, MOST_GATES // max(1, size)) + 1):

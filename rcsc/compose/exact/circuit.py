@@ -242,10 +242,7 @@ def circuit(
         known: Conditions that are known to hold before each later cycle; those about leaves in the cone of the obligations are made use of.
     """
     keys, in_pairs = tuple(owed.key for owed in wanted), any(owed.lines for owed in wanted)
-    roots = [step.contract, step.goes_on, *(owed.holds for owed in wanted)]
-    inside = cone(step, roots)
-    leaves = tuple(name for name in step.before if name in inside)
-    read = [*roots, *(step.after[name] for name in leaves)]
+    leaves, read = roots_of(step, wanted)
     gates = Gates()
     words = tuple(gates.word(step.before[name]) for name in leaves)
     later = _frame(gates, step, leaves, words, [owed.holds for owed in wanted])
@@ -292,9 +289,21 @@ def _frame(
 
 def _given(gates: Gates, read: Sequence[Node], leaves: frozenset[str]) -> Iterator[tuple[str, Given]]:
     """Yield each variable that is no leaf, with the points that tell its values apart."""
+    points = points_of(read)
+    kinds = {node.name: node.kind for node in parts_first(*read) if node.op is Shape.VARIABLE}
+    for name, word in gates.named.items():
+        if name not in leaves:
+            yield name, Given(kinds[name], word, points[name])
+
+
+def points_of(read: Sequence[Node]) -> dict[str, tuple[int, ...]]:
+    """Return for each variable keys such that every value does as one of these does; none where they are too many."""
     compared: dict[str, set[int]] = {}
     otherwise = {root.name for root in map(values.root, read) if root.op is Shape.VARIABLE}
+    kinds: dict[str, Scalar] = {}
     for node in parts_first(*read):
+        if node.op is Shape.VARIABLE:
+            kinds[node.name] = node.kind
         for at, arg in enumerate(node.args):
             variable = values.root(arg)
             if variable.op is not Shape.VARIABLE or node.op is Shape.NARROWED:
@@ -304,18 +313,24 @@ def _given(gates: Gates, read: Sequence[Node], leaves: frozenset[str]) -> Iterat
                 compared.setdefault(variable.name, set()).add(key_of(variable.kind, other.low))
             else:
                 otherwise.add(variable.name)
-    kinds = {node.name: node.kind for node in parts_first(*read) if node.op is Shape.VARIABLE}
-    for name, word in gates.named.items():
-        if name in leaves:
-            continue
-        kind = kinds[name]
-        low, high = key_bounds(kind)
-        if name not in otherwise or isinstance(kind, Bool):
-            beside = {key + by for key in compared.get(name, ()) for by in (0, 1)}
-            # between two constants, and beyond the last, one value stands for all
-            points = {0, 1} if isinstance(kind, Bool) else {low, *beside}
-            yield name, Given(kind, word, tuple(sorted(key for key in points if low <= key <= high)))
-        elif high - low < FEW:
-            yield name, Given(kind, word, tuple(range(low, high + 1)))
-        else:
-            yield name, Given(kind, word)
+    return {
+        name: _points(kind, compared.get(name, set()), among=name not in otherwise)
+        for name, kind in kinds.items()
+    }
+
+
+def _points(kind: Scalar, compared: set[int], *, among: bool) -> tuple[int, ...]:
+    low, high = key_bounds(kind)
+    if among or isinstance(kind, Bool):
+        # between two constants, and beyond the last, one value stands for all
+        points = {0, 1} if isinstance(kind, Bool) else {low, *compared, *(key + 1 for key in compared)}
+        return tuple(sorted(key for key in points if low <= key <= high))
+    return tuple(range(low, high + 1)) if high - low < FEW else ()
+
+
+def roots_of(step: Cycle, wanted: Sequence[Obligation]) -> tuple[tuple[str, ...], list[Node]]:
+    """Return the leaves in the cone of obligations, in declared order, and all that a circuit of a later cycle reads."""
+    roots = [step.contract, step.goes_on, *(owed.holds for owed in wanted)]
+    inside = cone(step, roots)
+    leaves = tuple(name for name in step.before if name in inside)
+    return leaves, [*roots, *(step.after[name] for name in leaves)]

@@ -15,8 +15,9 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from rcsc.compose.contract.obligations import ObligationKey
-from rcsc.compose.exact.circuit import EARLY, Circuit, Frame
+from rcsc.compose.contract.obligations import Obligation, ObligationKey
+from rcsc.compose.contract.transition import Cycle
+from rcsc.compose.exact.circuit import EARLY, Circuit, Frame, points_of, roots_of
 from rcsc.proof.symbolic.bits import TRUE, Literal
 
 MOST_GIVEN = 1 << 12
@@ -130,6 +131,15 @@ class _Pass:
 
 def _at(literal: Literal) -> int:
     return 2 * literal if literal > 0 else 1 - 2 * literal
+
+
+def may_apply(step: Cycle, wanted: Sequence[Obligation]) -> bool:
+    """Return whether what the environment may give in a later cycle can be listed, without making a circuit."""
+    leaves, read = roots_of(step, wanted)
+    many = 1
+    for name, points in points_of(read).items():
+        many *= 1 if name in leaves else len(points)
+    return 0 < many <= MOST_GIVEN
 
 
 def applies(circuit: Circuit) -> bool:

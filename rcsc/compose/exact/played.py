@@ -59,6 +59,8 @@ def every_run(ts: TransitionSystem, firsts: Sequence[Cycle], wanted: Sequence[Ob
     step = ts.cycle(ts.havoc())
     if any(cycle.calls for cycle in (*firsts, step)):
         return None  # what an extern procedure gives is no input
+    if not explicit.may_apply(step, wanted):
+        return None
     made = circuit(ts, firsts, step, wanted)
     if not explicit.applies(made):
         return None

@@ -12,7 +12,7 @@ says what it has found as conditions on leaves. Budgets are in steps.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract.obligations import Obligation, ObligationKey
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.exact import explicit
 from rcsc.compose.exact.bounded import looked
@@ -24,7 +24,9 @@ from rcsc.compose.invariant.search import FoundInvariant
 from rcsc.proof.solvers.horn import UnreadableError
 from rcsc.proof.solvers.smt import Answer
 
-CYCLES = 12
+STATED = frozenset({Sort.INVARIANT, Sort.PROPERTY})
+"""Obligations that people state to help a proof."""
+CYCLES = 8
 """Cycles of the runs that are looked at before anything is proved."""
 ROUNDS = (1_000_000, 4_000_000, 60_000_000)
 """Steps that Spacer gets for an obligation, round after round: the first takes less than a second."""
@@ -90,14 +92,15 @@ class _Open:
 
     def list_states(self) -> None:
         """Search all states: for all obligations at once, else for each by itself, which may depend on less."""
-        together = self.circuit(self.left)
-        if explicit.applies(together):
-            self._listed(together, self.left)
-            return
-        for at in self.left:
-            alone = self.circuit([at])
-            if explicit.applies(alone):
-                self._listed(alone, [at])
+        alone = [[at] for at in self.left]
+        for places in [self.left] if self._may_be_listed(self.left) else alone:
+            if self._may_be_listed(places):
+                made = self.circuit(places)
+                if explicit.applies(made):
+                    self._listed(made, places)
+
+    def _may_be_listed(self, places: Sequence[int]) -> bool:
+        return explicit.may_apply(self.step, [self.wanted[at] for at in places])
 
     def _listed(self, made: Circuit, places: Sequence[int]) -> None:
         found = explicit.explored(made)
@@ -137,7 +140,11 @@ class _Open:
         invariant = self.found.invariant
         return Lemmas(
             tuple(held(invariant.predicates, invariant.clauses, self.step.before)),
-            tuple(owed.holds for at, owed in enumerate(self.wanted) if at not in invariant.open),
+            tuple(
+                owed.holds
+                for at, owed in enumerate(self.wanted)
+                if owed.sort in STATED and at not in invariant.open
+            ),
         )
 
 
@@ -152,6 +159,7 @@ def helped(
     every = _Open(ts, firsts, step, wanted, Helped(invariant))
     if every.left:
         every.list_states()
-        every.look_at_short_runs()
-        every.relate()
+        if not ts.refuses:  # else what is left is tried once more without refusals
+            every.look_at_short_runs()
+            every.relate()
     return every.found

@@ -37,7 +37,8 @@ class Lemmas:
     """What is known of a later cycle.
 
     Attributes:
-        before: Conditions that hold before it; `within`, of the whole cycle.
+        before: Conditions that hold before it; those about other leaves are left out.
+        within: Conditions of the whole cycle. Leaves outside the cone in them may then have any values.
     """
 
     before: tuple[Node, ...] = ()
@@ -58,11 +59,8 @@ def related(
     leaves = [name for name in step.before if name in inside]
     if not leaves:
         return Answer.UNKNOWN, ()
-    known = [
-        one
-        for one in (*lemmas.before, *lemmas.within)
-        if {name for name in values.variables([one]) if name in step.before} <= inside
-    ]
+    known = [one for one in lemmas.before if values.variables([one]).keys() <= inside]
+    known += [one for one in lemmas.within if values.variables([one]).keys() & inside]
     keyed = _Whole()
     horn = Horn([keyed.term(step.before[name]) for name in leaves], steps)
     every = [keyed]

@@ -91,9 +91,13 @@ class Confirmation:
         node = self.node(at, after=False)
         return node.known and (node.low != value if value >= 0 else node.low == ~value)
 
-    def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
-        """Ask whether a cycle in this case breaks a clause: unsatisfiable if the clauses are an invariant."""
-        broken = smt.any_of([self.broken(clause, after=True) for clause in clauses])
+    def step_question(
+        self, clauses: Sequence[Clause], case: Node, fresh: Sequence[Clause] | None = None
+    ) -> Solver:
+        """Ask whether a cycle in this case breaks a clause, of the fresh ones: unsatisfiable if, with the others, they are an invariant."""
+        broken = smt.any_of(
+            [self.broken(clause, after=True) for clause in (clauses if fresh is None else fresh)]
+        )
         here = self.keyed.term(case)
         solver = self.known(clauses)
         solver.add(here, broken)

@@ -83,8 +83,11 @@ def search(
     wanted: Sequence[Obligation],
     effort: Effort,
     candidates: Sequence[NamedClause] = (),
+    begun: FoundInvariant | None = None,
 ) -> FoundInvariant:
     """Find an invariant from which as many obligations follow as possible.
+
+    What was begun is gone on from: an invariant that is known, and states that walks reached. Only what it leaves open is searched for.
 
     Candidates, from wherever they come, are clauses to begin with. What is proved does not depend on them: the search decides which
     obligations follow from some invariant over its predicates.
@@ -93,8 +96,11 @@ def search(
         GaveUpError: The solver did.
     """
     reads = read(cycle, wanted)
-    states, ran = _walked(ts, effort)
-    invariant = FoundInvariant(open=frozenset(range(len(wanted))), states=states, ran=ran)
+    if begun is None:
+        begun = begin(ts, wanted, effort)
+    if not begun.open:
+        return begun
+    invariant = begun
     owed = [*(obligations(ts, first) for first in firsts), wanted]
     by_size = {
         len(chosen): chosen for chosen in (every_predicate(ts, cycle, reads, at) for at in range(CLOSELY + 1))
@@ -103,18 +109,24 @@ def search(
     tried = [_placed(candidates, chosen) for chosen in rounds]
     needed = max(map(len, tried))  # what the candidates were found with is there from the start
     for chosen, clauses in zip(rounds, tried, strict=True):
-        if len(clauses) < needed:
+        if len(clauses) < needed or len(chosen) < len(invariant.predicates):
             continue
         left = sorted(invariant.open)
         posed = [
             Posed(chosen, each, {at: every[at].holds for at in left})
             for each, every in zip((*firsts, cycle), owed, strict=True)
         ]
-        invariant, left_open = _searched(ts, chosen, posed, invariant, left, clauses)
-        invariant = replace(invariant, open=frozenset(left_open))
+        invariant, still_open = _searched(ts, chosen, posed, invariant, left, clauses)
+        invariant = replace(invariant, open=frozenset(still_open))
         if not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open):
             break
     return invariant
+
+
+def begin(ts: TransitionSystem, wanted: Sequence[Obligation], effort: Effort) -> FoundInvariant:
+    """Return what is known before a search: the states that walks reach."""
+    states, ran = _walked(ts, effort)
+    return FoundInvariant(open=frozenset(range(len(wanted))), states=states, ran=ran)
 
 
 def strengthened(

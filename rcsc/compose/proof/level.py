@@ -6,7 +6,7 @@ the environment does within its contract, and every cycle that begins in it fulf
 """
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -14,13 +14,22 @@ from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
-from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.predicates import CLOSELY, Predicate
+from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.exact.portfolio import helped
 from rcsc.compose.exact.said import Found
 from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search, strengthened
+from rcsc.compose.invariant.search import (
+    LIMITS,
+    Effort,
+    FoundInvariant,
+    begin,
+    read,
+    search,
+    strengthened,
+)
 from rcsc.compose.proof.candidates import Candidates, candidates, content, keep_candidates
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
@@ -126,15 +135,38 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
     """
     effort, refusing = effort or Effort(), ts.refusing()
     if not refusing.refuses:
-        return _proved_of(ts, effort, cache)
-    first = _proved_of(refusing, effort, cache)
+        return _proved_of(ts, effort, cache, begin(ts, (), effort))
+    walked = begin(ts, (), effort)  # of cycles that take their inputs: the same in both
+    first = _proved_of(refusing, effort, cache, walked)
+    looked = first.context is not None and all(ending.proved for ending in first.endings)
     stands = first.stands or ts.links.above is None
-    looked = first.context is not None and stands and all(ending.proved for ending in first.endings)
-    if not first.open and (looked or not effort.looks):
+    if not first.open and ((looked and stands) or not effort.looks):
         return first
     begun = FoundInvariant(first.predicates, first.clauses).named
     without = replace(effort, looks=effort.looks and not looked)
-    return joined(first, _proved(ts, without, None, Candidates(begun, content(ts))))
+    known = Candidates(begun, content(ts))
+    return joined(
+        first, _proved(ts, without, None, walked, known, _Refusing(first, stands=stands or not effort.looks))
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusing:
+    """The proof of a level whose inputs may be refused: what it has shown need not be shown again where none is.
+
+    Every cycle without refusals is one with them, and so is every beginning; so what is an invariant there, confirmed, is one here.
+
+    Attributes:
+        stands: Whether nothing is left to be shown of its report.
+    """
+
+    proof: LevelProof
+    stands: bool
+
+    @property
+    def proved(self) -> Mapping[Key, Verdict]:
+        """The verdicts that stay."""
+        return {owed.key: verdict for owed, verdict in self.proof.verdicts if verdict in ACCEPTED}
 
 
 def joined(refusing: LevelProof, admitting: LevelProof) -> LevelProof:
@@ -161,16 +193,18 @@ def without_nodes(proof: LevelProof) -> LevelProof:
     return replace(proof, verdicts=verdicts)
 
 
-def _proved_of(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
+def _proved_of(
+    ts: TransitionSystem, effort: Effort, cache: Cache | None, walked: FoundInvariant
+) -> LevelProof:
     """Prove a level in one environment: find an invariant, confirm it, decide each obligation, analyse the lines in context.
 
     The search begins with the clauses that the last one left in the cache. Lines and endings may depend on which invariant it finds: where
     more is missing of them than in the version of the level that the clauses were found of, all is proved once more without those.
     """
     this, begun = content(ts), candidates(cache, ts)
-    proof = _proved(ts, effort, cache, begun)
+    proof = _proved(ts, effort, cache, walked, begun)
     if begun.found_of != this and not set(_lacking(proof)) <= set(begun.lacking):
-        proof = _proved(ts, effort, cache, Candidates(found_of=this))
+        proof = _proved(ts, effort, cache, walked, Candidates(found_of=this))
     found = FoundInvariant(proof.predicates, proof.clauses)
     keep_candidates(cache, ts, found, Candidates(found_of=this, lacking=_lacking(proof)))
     return proof
@@ -191,15 +225,28 @@ def _lacking(proof: LevelProof) -> tuple[str, ...]:
     )
 
 
-def _proved(ts: TransitionSystem, effort: Effort, cache: Cache | None, known: Candidates) -> LevelProof:
+def _proved(
+    ts: TransitionSystem,
+    effort: Effort,
+    cache: Cache | None,
+    walked: FoundInvariant,
+    known: Candidates,
+    refusing: _Refusing | None = None,
+) -> LevelProof:
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, cycle)
     with smt.together(TOGETHER * effort.limits.steps):
         try:
-            found = search(ts, firsts, cycle, wanted, effort, known.clauses)
+            before = None if refusing is None else _begun(ts, cycle, wanted, refusing)
+            from_here = before or FoundInvariant(open=frozenset(range(len(wanted))))
+            from_here = replace(from_here, states=walked.states, ran=walked.ran)
+            found = search(ts, firsts, cycle, wanted, effort, known.clauses, from_here)
             keep_candidates(cache, ts, found, known)
-            concluded = _concluded(ts, firsts, cycle, wanted, found, effort)
+            posed = _Posed(
+                ts, firsts, cycle, wanted, effort, refusing, () if before is None else before.clauses
+            )
+            concluded = _concluded(posed, found)
             _uncut(cut_before)
         except (GaveUpError, NotConfirmedError):
             undecided = tuple((obligation, Verdict.UNDECIDED) for obligation in wanted)
@@ -240,67 +287,86 @@ class _Concluded:
     exact: bool = False
 
 
-def _concluded(
-    ts: TransitionSystem,
-    firsts: tuple[Cycle, ...],
-    cycle: Cycle,
-    wanted: tuple[Obligation, ...],
-    found: FoundInvariant,
-    effort: Effort,
-) -> _Concluded:
+@dataclass(frozen=True, slots=True)
+class _Posed:
+    """What is to be shown of a level, in one environment.
+
+    Attributes:
+        refusing: What was shown where inputs may be refused, if that is the other environment.
+        known: The clauses that are an invariant, confirmed, by that.
+    """
+
+    ts: TransitionSystem
+    firsts: tuple[Cycle, ...]
+    cycle: Cycle
+    wanted: tuple[Obligation, ...]
+    effort: Effort
+    refusing: _Refusing | None = None
+    known: tuple[Clause, ...] = ()
+
+
+def _begun(
+    ts: TransitionSystem, cycle: Cycle, wanted: tuple[Obligation, ...], refusing: _Refusing
+) -> FoundInvariant | None:
+    """Return the invariant that was confirmed of the other environment, with what it leaves open.
+
+    None if it speaks of other leaves, or of what exact engines found: then all is searched for once more, which the clauses shorten.
+    """
+    proof = refusing.proof
+    names = [predicate.name for predicate in proof.predicates]
+    reads = read(cycle, wanted)
+    chosen = (every_predicate(ts, cycle, reads, closely) for closely in range(CLOSELY + 1))
+    if not any([predicate.name for predicate in every] == names for every in chosen):
+        return None
+    left = frozenset(at for at, owed in enumerate(wanted) if owed.key not in refusing.proved)
+    return FoundInvariant(proof.predicates, proof.clauses, left, proof.walked, proof.learnt)
+
+
+def _concluded(posed: _Posed, found: FoundInvariant) -> _Concluded:
     """Conclude from the invariant that the exact engines make stronger; from what was found before, where that is not confirmed.
 
     Raises:
         GaveUpError: The solver did.
         NotConfirmedError: Nothing is confirmed.
     """
-    more = helped(ts, firsts, cycle, wanted, found)
+    more = helped(posed.ts, posed.firsts, posed.cycle, posed.wanted, found)
     for exact in (False, True) if more.by else ():
         try:
-            concluded = _confirmed_of(ts, firsts, cycle, wanted, more.invariant, effort, exact=exact)
+            concluded = _confirmed_of(posed, more.invariant, exact=exact)
         except NotConfirmedError:
             continue
         if all(verdict in ACCEPTED for owed, verdict in concluded.verdicts if owed.key in more.by):
             return replace(concluded, by=tuple(more.by.items()), conditions=tuple(more.conditions))
-    return _confirmed_of(ts, firsts, cycle, wanted, found, effort)
+    return _confirmed_of(posed, found)
 
 
-def _confirmed_of(
-    ts: TransitionSystem,
-    firsts: tuple[Cycle, ...],
-    cycle: Cycle,
-    wanted: tuple[Obligation, ...],
-    invariant: FoundInvariant,
-    effort: Effort,
-    *,
-    exact: bool = False,
-) -> _Concluded:
+def _confirmed_of(posed: _Posed, invariant: FoundInvariant, *, exact: bool = False) -> _Concluded:
     """Have an invariant confirmed, decide each obligation, and analyse the lines in context.
 
     Raises:
         GaveUpError: The solver did.
         NotConfirmedError: It is no invariant.
     """
-    asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits, exact=exact)
+    ts, wanted, refusing = posed.ts, posed.wanted, posed.refusing
+    asked = _asked_anew(invariant.predicates, posed.firsts, posed.cycle, posed.effort.limits, exact=exact)
     # no line in context and no ending goes by these
     aside = {Sort.NUMBERED, Sort.DONE_STAYS, Sort.FAILED_STAYS, Sort.PROPERTY, Sort.REQUIREMENT}
-    looks = effort.looks and not any(wanted[at].sort not in aside for at in invariant.open)
+    may_look = not any(wanted[at].sort not in aside for at in invariant.open)
+    looks, stands = posed.effort.looks and may_look, refusing is not None and not refusing.stands and may_look
     flow = Flow(ts, asked, invariant.clauses)
-    if looks and (
-        others := [
-            *flow.no_loop_steps(),
-            *flow.wanted_to_stand(),
-            *never_run(asked, invariant.clauses, invariant.ran),
-        ]
-    ):
+    others = flow.wanted_to_stand() if looks or stands else []
+    if looks:
+        lines = never_run(asked, invariant.clauses, invariant.ran)
+        others = [*flow.no_loop_steps(), *others, *lines]
+    if others:
         found = invariant.clauses
-        invariant = strengthened(ts, firsts, cycle, invariant, others)
+        invariant = strengthened(ts, posed.firsts, posed.cycle, invariant, others)
         if invariant.clauses != found:
             flow = Flow(ts, asked, invariant.clauses)
-    _confirm(asked, invariant.clauses)
-    verdicts = tuple(_verdicts(ts, asked, invariant, wanted))
+    _confirm(asked, invariant.clauses, frozenset(posed.known))
+    verdicts = tuple(_verdicts(ts, asked, invariant, wanted, {} if refusing is None else refusing.proved))
     if not looks:
-        return _Concluded(invariant, verdicts, exact=exact)
+        return _Concluded(invariant, verdicts, stands=stands and flow.report_stands(), exact=exact)
     seen, endings = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
     return _Concluded(invariant, verdicts, seen, endings, flow.report_stands(), exact=exact)
 
@@ -326,15 +392,18 @@ def _asked_anew(
     return Confirmation(predicates, firsts, cycle, cycle.cases, ExactIntegers() if exact else Keyed(), limits)
 
 
-def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
-    """Ask another solver whether the clauses are an invariant: the search is not trusted.
+def _confirm(asked: Confirmation, clauses: Sequence[Clause], known: Container[Clause] = ()) -> None:
+    """Ask another solver whether the clauses are an invariant, given that the `known` ones are: the search is not trusted.
 
     Raises:
         NotConfirmedError: They are not, or the solver gave up.
     """
+    fresh = [clause for clause in clauses if clause not in known]
+    if not fresh and clauses:
+        return
     left = [
-        *(partial(asked.first_question, clauses, first) for first in asked.firsts),
-        *(partial(asked.step_question, clauses, case) for case in asked.cases),
+        *(partial(asked.first_question, fresh, first) for first in asked.firsts),
+        *(partial(asked.step_question, clauses, case, fresh) for case in asked.cases),
     ]
     for seed, part in enumerate(TRIES):
         left = [make for make in left if not _confirmed(make(), asked.limits.steps // part, seed)]
@@ -356,18 +425,28 @@ def _confirmed(question: Solver, steps: int, seed: int) -> bool:
 
 
 def _verdicts(
-    ts: TransitionSystem, inference: Confirmation, invariant: FoundInvariant, wanted: tuple[Obligation, ...]
+    ts: TransitionSystem,
+    inference: Confirmation,
+    invariant: FoundInvariant,
+    wanted: tuple[Obligation, ...],
+    shown: Mapping[Key, Verdict],
 ) -> Iterable[tuple[Obligation, Verdict]]:
-    """Decide each obligation: can a first cycle, or a cycle from the invariant, break it?"""
+    """Decide each obligation that is not shown already: can a first cycle, or a cycle from the invariant, break it?"""
     keyed = inference.keyed
     every = [wanted, *(obligations(ts, first) for first in inference.firsts)]
-    asked = [[keyed.term(values.negation(obligation.holds)) for obligation in each] for each in every]
+    asked = [
+        [keyed.term(values.negation(owed.holds if owed.key not in shown else TRUE)) for owed in each]
+        for each in every
+    ]
     solvers = [
         inference.known(invariant.clauses),
         *(inference.beginning(first) for first in inference.firsts),
     ]
     believed = _believed(ts, inference, invariant.clauses, solvers)
     for at, obligation in enumerate(wanted):
+        if obligation.key in shown:
+            yield obligation, shown[obligation.key]
+            continue
         if at in invariant.open:
             yield obligation, Verdict.NOT_PROVED
             continue
@@ -478,6 +557,8 @@ def _certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits) -> dic
         scripts[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
     if proof.context is not None:
         scripts |= _looked_again(ts, proof, asked)
+    elif proof.stands:
+        scripts |= _stands_again(Flow(ts, asked, proof.clauses), asked, stands=True)
     return scripts
 
 
@@ -490,11 +571,20 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
     for ending in flow.endings():
         ends.append(ending)
         scripts |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    stands = flow.report_stands()
-    scripts |= {f"stands {number}": text for number, text in enumerate(_refuted(asked), 1)}
-    if (seen, tuple(ends), stands) != (proof.context, proof.endings, proof.stands):
-        scripts["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
+    scripts |= _stands_again(flow, asked, stands=proof.stands)
+    if (seen, tuple(ends)) != (proof.context, proof.endings):
+        scripts[_AS_BEFORE] = _HAS_A_MODEL
     return scripts
+
+
+_AS_BEFORE, _HAS_A_MODEL = "lines and endings as before", "(set-logic ALL)\n(check-sat)\n"
+
+
+def _stands_again(flow: Flow, asked: Confirmation, *, stands: bool) -> dict[str, str]:
+    """Write the questions that `Flow.report_stands` rests on."""
+    again = flow.report_stands()
+    scripts = {f"stands {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    return scripts if again == stands else {**scripts, _AS_BEFORE: _HAS_A_MODEL}
 
 
 def _refuted(asked: Confirmation) -> list[str]:

@@ -48,12 +48,15 @@ class Sat:
         queries: How often it was asked.
     """
 
-    def __init__(self, clauses: Iterable[list[int]], read: Iterable[int] = ()) -> None:
+    def __init__(
+        self, clauses: Iterable[list[int]], read: Iterable[int] = (), conflicts: int = CONFLICTS
+    ) -> None:
         """Assert the clauses.
 
         Args:
             clauses: Each a list of literals, one of which holds.
             read: All literals that are added, assumed or read later, but new variables; by default any may be.
+            conflicts: The limit of all questions together.
         """
         from pysat.solvers import Minisat22
 
@@ -61,6 +64,7 @@ class Sat:
         self._solver: Any = Minisat22(bootstrap_with=_simplified(clauses, kept) if kept else clauses)
         self._model: list[int] = []
         self.queries = 0
+        self._conflicts = conflicts
 
     def add(self, clause: list[int]) -> None:
         """Assert that one of the literals holds."""
@@ -70,10 +74,10 @@ class Sat:
         """Return whether all that is asserted can hold together with these literals.
 
         Raises:
-            GaveUpError: After `BUDGET` conflicts; after `QUESTIONS` questions or `CONFLICTS` conflicts in all.
+            GaveUpError: After `BUDGET` conflicts; after `QUESTIONS` questions, or so many conflicts in all as it may have.
         """
         self.queries += 1
-        left = CONFLICTS - self._solver.accum_stats()["conflicts"]
+        left = self._conflicts - self._solver.accum_stats()["conflicts"]
         if self.queries > QUESTIONS or left <= 0:
             raise GaveUpError
         self._solver.conf_budget(min(BUDGET, left))
