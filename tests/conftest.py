@@ -80,7 +80,7 @@ def dock(dock_compiled: Path, tmp_path: Path) -> Path:
 
 
 TOOLS = (
-    "arm-none-eabi-gcc", "chromium", "clang", "clang-19", "clang-tidy-19", "cmake", "frama-c", "llvm-cov-19", "pkg-config",
+    "arm-none-eabi-gcc", "berkeley-abc", "chromium", "clang", "clang-19", "clang-tidy-19", "cmake", "frama-c", "llvm-cov-19", "pkg-config",
     "qemu-system-arm", "qemu-system-riscv32", "riscv64-unknown-elf-gcc",
     "valgrind",
 )  # fmt: skip

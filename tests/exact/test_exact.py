@@ -1,5 +1,7 @@
 """Each engine against every state of drawn levels; what is trusted broken once, and noticed; the cases that asked for the engines."""
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -20,9 +22,11 @@ from rcsc.compose.exact import explicit, played
 from rcsc.compose.exact.bounded import Looked, looked
 from rcsc.compose.exact.circuit import Circuit, Frame, Gates, circuit
 from rcsc.compose.exact.explicit import Explored
+from rcsc.compose.exact.export import aiger, btor2
 from rcsc.compose.exact.said import boxes, predicate
 from rcsc.compose.exact.spacer import Lemmas, related
 from rcsc.compose.proof.level import Verdict, certificate, prove_level
+from rcsc.compose.proof.system import transition_systems
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Int
 from rcsc.lang.operator_table import Arithmetic, Op, divide
@@ -350,3 +354,94 @@ def refuted(script: str) -> bool:
     solver = z3.Solver()
     solver.from_string(script)
     return bool(solver.check() == z3.unsat)
+
+
+# --- for other model checkers ---------------------------------------------------------------
+
+
+@pytest.mark.needs("berkeley-abc")
+@pytest.mark.parametrize("seed", SEEDS)
+def test_another_model_checker_says_the_same_of_drawn_levels(seed: int, tmp_path: Path) -> None:
+    ts, true = judged(seed)
+    one = made(ts)
+    for at, key in enumerate(one.wanted):
+        holds = key not in true.least and key not in true.restarted
+        assert abc(aiger(one, [at]), tmp_path) == ("proved" if holds else "broken")
+
+
+@pytest.mark.needs("berkeley-abc")
+def test_another_model_checker_says_the_same_of_a_level_that_is_broken_and_of_one_that_is_not(
+    tmp_path: Path,
+) -> None:
+    assert abc(aiger(made(alone(ROUND)), together=True), tmp_path) == "proved"
+    assert abc(aiger(made(alone(LIGHT.replace("{least}", "< 30"))), together=True), tmp_path) == "broken"
+
+
+@pytest.mark.needs("berkeley-abc")
+@pytest.mark.parametrize("level", ["gripper", "vision"])
+def test_another_model_checker_proves_all_that_a_shipped_level_owes(level: str, tmp_path: Path) -> None:
+    path = Path(__file__).parents[2] / "tables" / "system.toml"
+    ts = transition_systems(path)[level]
+    step = ts.cycle(ts.havoc())
+    one = circuit(ts, tuple(ts.firsts().values()), step, obligations(ts, step))
+    assert abc(aiger(one, together=True), tmp_path) == "proved"
+
+
+def abc(question: bytes, folder: Path) -> str:
+    file = folder / "question.aig"
+    file.write_bytes(question)
+    tool = shutil.which("berkeley-abc")
+    assert tool is not None
+    said = subprocess.run(
+        [tool, "-c", f"read_aiger {file}; pdr"], capture_output=True, text=True, check=True
+    ).stdout
+    return "proved" if "Property proved" in said else "broken" if "was asserted in frame" in said else said
+
+
+def test_a_run_breaks_what_is_written_as_btor2_in_its_last_cycle_and_not_before() -> None:
+    """A reader of the few forms that are written: it plays the run that the search of states has found."""
+    ts = alone(LIGHT.replace("{least}", "< 30"))
+    one = made(ts)
+    [run] = explicit.explored(one).runs.values()
+    lines = [line.split() for line in btor2(one).decode().splitlines()]
+    state: dict[int, int] = {}
+    for number, given in enumerate(run.given, 1):
+        bad, state = played_as_btor2(lines, state, {**given, "restarts": run.begins})
+        assert bad == (number == len(run.given))
+
+
+def played_as_btor2(
+    lines: list[list[str]], state: dict[int, int], given: dict[str, int]
+) -> tuple[bool, dict[int, int]]:
+    named = {"_".join(name.split()): key for name, key in given.items()}
+    width: dict[int, int] = {}
+    sort: dict[int, int] = {}
+    value: dict[int, int] = {}
+    after: dict[int, int] = {}
+    bad = False
+
+    def read(text: str) -> int:
+        return value[int(text)] if int(text) > 0 else 1 - value[-int(text)]
+
+    for first, kind, *rest in lines:
+        number = int(first)
+        if kind == "sort":
+            width[number] = int(rest[1])
+        elif kind in {"zero", "one"}:
+            value[number] = int(kind == "one")
+        elif kind == "state":
+            value[number], sort[number] = state.get(number, 0), width[int(rest[0])]
+        elif kind == "input":
+            value[number] = named.get(rest[1], 0) & (1 << width[int(rest[0])]) - 1
+        elif kind == "slice":
+            value[number] = value[int(rest[1])] >> int(rest[2]) & 1
+        elif kind == "and":
+            value[number] = read(rest[1]) & read(rest[2])
+        elif kind == "concat":
+            size = width[int(rest[0])] - 1
+            value[number] = read(rest[1]) << size | read(rest[2])
+        elif kind == "next":
+            after[int(rest[1])] = read(rest[2])
+        elif kind == "bad":
+            bad = bad or bool(read(rest[0]))
+    return bad, after

@@ -23,6 +23,7 @@ Examples:
   rcsc prove my_robot                          the system in a folder
   rcsc prove tables/system.toml --level task   one level in its environment
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
+  rcsc prove --export aiger questions          each level and what it owes, for another model checker
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
   rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
   rcsc prove --where "stock = 0"               traces that begin with an empty stock
@@ -56,6 +57,9 @@ Examples:
               help="Write each level's questions to DIR as SMT-LIB: each is to be answered `unsat`.")  # fmt: skip
 @click.option("--certify", "confirms", is_flag=True,
               help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
+@click.option("--export", "exports", type=(click.Choice(["aiger", "btor2"]), click.Path(file_okay=False, path_type=Path)),
+              default=None, metavar="aiger|btor2 DIR",
+              help="Write each level, exact, and what it owes to DIR for another model checker, and prove nothing.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--progress", is_flag=True,
               help="Print each level on standard error once it is done; a terminal always shows it.")  # fmt: skip
@@ -67,7 +71,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int | None,
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
-    certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
+    certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None,
+    no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -90,7 +95,11 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     key = tuple(
         map(str, (os.getcwd(), path, only, steps, cycles, further, begins, strict, invariants, as_json))
     )
-    if cache is not None and path is not None and not (logs or freeze or certificate or confirms or progress):
+    if (
+        cache is not None
+        and path is not None
+        and not (logs or freeze or certificate or confirms or exports or progress)
+    ):
         known = recall_lines(cache, path, key)
         if known is not None:
             for line in known:
@@ -98,12 +107,15 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
             return 0
     from rcsc.front.commands.systems.proving import (  # what is known is printed without
         Asked,
+        exported,
         proved,
         run_cases,
     )
 
     if path is None:
         return run_cases(cases)
+    if exports is not None:
+        return exported(path, only, *exports)
     asked = Asked(
         only, steps, jobs, cycles, further, begins, logs, freeze, variants, certificate, confirms, progress, strict, invariants,
         as_json,

@@ -16,12 +16,14 @@ from rcsc.base.host.cache import Cache
 from rcsc.base.host.files import write_atomically
 from rcsc.compose.contract.beginning import BadStartError, Starts, starts
 from rcsc.compose.contract.claims import CONTRACT
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
+from rcsc.compose.exact.circuit import circuit
+from rcsc.compose.exact.export import aiger, btor2
 from rcsc.compose.invariant.cubes import as_condition, shown
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, certificate
@@ -95,9 +97,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     stood = digest_at(str(path))
     systems, loaded = read_systems(path)
     sources = {file: source for files in loaded.values() for file, source in files.sources.items()}
-    unknown = [name for name in asked.only if name not in systems]
-    if unknown:
-        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
+    names = _known(asked.only, systems) or tuple(systems)
     length = usual_length(systems.values()) if asked.cycles is None else asked.cycles
     settings = TraceSettings(
         description(path),
@@ -110,7 +110,6 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     for name in asked.variants:
         systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
     effort = Effort(limits=Limits.of(asked.steps))
-    names = asked.only or tuple(systems)
     large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
     with _LevelProgress(names, wanted=asked.progress) as done:
         jobs = asked.jobs or (cores() if large else 1)
@@ -134,6 +133,31 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
             cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked, sources)), stood, loaded
         )
     return status
+
+
+def exported(path: Path, only: tuple[str, ...], form: str, folder: Path) -> int:
+    """Write each level, whose inputs may be refused, with its obligations for another model checker; return the exit status."""
+    systems = read_systems(path)[0]
+    for name in _known(only, systems) or systems:
+        ts = systems[name].refusing()
+        step = ts.cycle(ts.havoc())
+        made = circuit(ts, tuple(ts.firsts().values()), step, obligations(ts, step))
+        file = folder / f"{name}.{'aig' if form == 'aiger' else form}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomically(file, aiger(made) if form == "aiger" else btor2(made))
+        except OSError as error:
+            raise UnwritableError(str(folder), error.strerror or "no reason given") from error
+        left_open = f"; left open: {', '.join(made.opened)}" if made.opened else ""
+        click.echo(f"{file}: {len(made.wanted)} obligations, {len(made.latches)} bits of state{left_open}")
+    return 0
+
+
+def _known(only: tuple[str, ...], systems: Mapping[str, TransitionSystem]) -> tuple[str, ...]:
+    unknown = [name for name in only if name not in systems]
+    if unknown:
+        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
+    return only
 
 
 def _say(lines: Iterable[str]) -> None:

@@ -1,17 +1,18 @@
-"""A circuit for other people's model checkers: as AIGER 1.9 text in bytes, the form of the hardware model checking competition.
+"""A circuit for other people's model checkers: as AIGER, bit by bit, or as BTOR2, in which states and inputs are words.
 
-In: a circuit. Out: a binary file with an output for each obligation, which is 1 where it is broken. Latch `started` tells a first cycle
+In: a circuit. Out: a file with an output for each obligation, which is 1 where it is broken. Latch `started` tells a first cycle
 from a later one, input `restarts` a first one from that after a restart; once latch `ended` is 1, the environment has broken the contract
 or the cycle has ended in a fault, and nothing is bad any more.
 
-Source: Biere, Heljanko and Wieringa, "AIGER 1.9 and beyond", 2011.
+Source: Biere, Heljanko and Wieringa, "AIGER 1.9 and beyond", 2011; Niemetz, Preiner, Wolf and Biere, "BTOR2, BtorMC and Boolector 3.0",
+2018.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.compose.exact.circuit import EARLY, Circuit, Gate
-from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal
+from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal, Word
 
 STARTED, ENDED, RESTARTS = "started", "ended", "restarts"
 
@@ -65,8 +66,20 @@ class _Whole:
         return self.choice(self.started, later, first)
 
 
-def aiger(circuit: Circuit, wanted: Iterable[int] | None = None, *, together: bool = False) -> bytes:
-    """Return a circuit in binary AIGER, with outputs for these obligations, by position; or one for all of them `together`."""
+@dataclass(frozen=True, slots=True)
+class _System:
+    """The frames of a circuit as one transition system.
+
+    Attributes:
+        latches: The literal of each latch after a cycle; `bad`, that of each output.
+    """
+
+    whole: _Whole
+    latches: dict[Literal, Literal]
+    bad: dict[str, Literal]
+
+
+def _system(circuit: Circuit, wanted: Iterable[int] | None, *, together: bool) -> _System:
     whole, frames = _Whole(circuit), (*circuit.firsts, circuit.step)
     valid = whole.both(-whole.ended, whole.of([frame.valid for frame in frames]))
     on = whole.both(valid, whole.of([frame.goes_on for frame in frames]))
@@ -87,8 +100,91 @@ def aiger(circuit: Circuit, wanted: Iterable[int] | None = None, *, together: bo
     latches |= {
         latch: whole.of([frame.after[at] for frame in frames]) for at, latch in enumerate(circuit.latches)
     }
+    return _System(whole, latches, bad)
+
+
+def aiger(circuit: Circuit, wanted: Iterable[int] | None = None, *, together: bool = False) -> bytes:
+    """Return a circuit in binary AIGER, with outputs for these obligations, by position; or one for all of them `together`."""
+    made = _system(circuit, wanted, together=together)
+    whole = made.whole
     names = {whole.started: STARTED, whole.ended: ENDED, whole.restarts: RESTARTS, **dict(_names(circuit))}
-    return _written(whole, latches, bad, names)
+    return _written(whole, made.latches, made.bad, names)
+
+
+def btor2(circuit: Circuit, wanted: Iterable[int] | None = None) -> bytes:
+    """Return a circuit in BTOR2, with a bad state for each of these obligations, by position."""
+    made = _system(circuit, wanted, together=False)
+    lines = _Lines()
+    zero = lines.add("zero", lines.sort(1))  # a value with which a state begins stands before it
+    words = {
+        STARTED: (made.whole.started,), ENDED: (made.whole.ended,), **dict(zip(circuit.leaves, circuit.words, strict=True)),
+    }  # fmt: skip
+    inputs = {RESTARTS: (made.whole.restarts,), **{name: given.word for name, given in circuit.given.items()}}
+    states = {name: lines.word("state", name, word) for name, word in words.items()}
+    for name, word in inputs.items():
+        lines.word("input", name, word)
+    known = {*made.whole.ands, *made.latches, *map(abs, (bit for word in inputs.values() for bit in word))}
+    for open_ in sorted(set(range(TRUE + 1, made.whole.count + 1)) - known):
+        lines.word("input", f"open {open_}", (open_,))
+    for gate in sorted(made.whole.ands):
+        lines.gate(gate, made.whole.ands[gate])
+    for name, word in words.items():
+        lines.next(states[name], [made.latches.get(bit, bit) for bit in word])
+    for name in (STARTED, ENDED):
+        lines.add("init", lines.sort(1), states[name], zero)
+    for name, literal in made.bad.items():
+        lines.add("bad", lines.of(literal), _symbol(name))
+    return "".join(f"{line}\n" for line in lines.written).encode()
+
+
+@dataclass(slots=True)
+class _Lines:
+    """The lines of a BTOR2 file, each under its number."""
+
+    written: list[str] = field(default_factory=list)
+    _sorts: dict[int, int] = field(default_factory=dict)
+    _nodes: dict[Literal, int] = field(default_factory=dict)
+
+    def add(self, *parts: object) -> int:
+        """Write a line; return its number."""
+        self.written.append(" ".join(map(str, (len(self.written) + 1, *parts))))
+        return len(self.written)
+
+    def sort(self, width: int) -> int:
+        """Return the sort of words of so many bits."""
+        if width not in self._sorts:
+            self._sorts[width] = self.add("sort", "bitvec", width)
+        return self._sorts[width]
+
+    def word(self, kind: str, name: str, word: Word) -> int:
+        """Declare a word, and its bits that are variables."""
+        sort, bit_sort = self.sort(len(word)), self.sort(1)
+        number = self.add(kind, sort, _symbol(name))
+        for at, bit in enumerate(word):
+            if abs(bit) != TRUE:
+                self._nodes[bit] = number if len(word) == 1 else self.add("slice", bit_sort, number, at, at)
+        return number
+
+    def gate(self, gate: Literal, parts: Gate) -> None:
+        """Write a conjunction."""
+        self._nodes[gate] = self.add("and", self.sort(1), *map(self.of, parts))
+
+    def of(self, literal: Literal) -> int:
+        """Return the number of a literal; the opposite of a line is its negative."""
+        if abs(literal) == TRUE and TRUE not in self._nodes:
+            self._nodes[TRUE] = self.add("one", self.sort(1))
+        return self._nodes[literal] if literal > 0 else -self._nodes[-literal]
+
+    def next(self, state: int, bits: Sequence[Literal]) -> None:
+        """State what a word is after a cycle, lowest bit first."""
+        value = self.of(bits[0])
+        for width, bit in enumerate(bits[1:], 2):
+            value = self.add("concat", self.sort(width), self.of(bit), value)
+        self.add("next", self.sort(len(bits)), state, value)
+
+
+def _symbol(name: str) -> str:
+    return "_".join(name.split())
 
 
 def _names(circuit: Circuit) -> Iterator[tuple[Literal, str]]:
