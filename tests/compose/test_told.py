@@ -50,7 +50,7 @@ def counting(
 def test_a_wait_takes_a_line() -> None:
     [*wait] = counting(*range(3, 603))
     assert shapes(*wait) == [{"n": "3"}, (598, {"n": "4 .. 601"}), {"n": "602"}]
-    still = [("a", {})] * 7
+    still: list[tuple[str | None, Mapping[str, str]]] = [("a", {})] * 7
     assert shapes(*still) == [{}, (5, {}), {}]
 
 
