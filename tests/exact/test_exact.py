@@ -27,6 +27,7 @@ from rcsc.compose.exact.said import boxes, predicate
 from rcsc.compose.exact.spacer import Lemmas, related
 from rcsc.compose.proof.level import Verdict, certificate, prove_level
 from rcsc.compose.proof.system import transition_systems
+from rcsc.front.commands import run
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Int
 from rcsc.lang.operator_table import Arithmetic, Op, divide
@@ -37,7 +38,7 @@ from tests.compose.test_hierarchies import roles
 from tests.exact.judged import Truth, drawn, truth
 from tests.small_hierarchies.explored import explored
 from tests.small_hierarchies.more import furnished
-from tests.support.programs.systems import LITTLE, alone
+from tests.support.programs.systems import LITTLE, alone, solo_system
 
 SEEDS = (1, 3, 6, 7, 8, 12, 15, 16, 18)
 DEEP = 6
@@ -57,7 +58,7 @@ def made(ts: TransitionSystem) -> Circuit:
 
 
 def lengths(found: Explored | Looked, begins: int) -> dict[ObligationKey, int]:
-    return {key: len(run.given) for key, run in found.runs.items() if run.begins == begins}
+    return {key: len(one.given) for key, one in found.runs.items() if one.begins == begins}
 
 
 # --- engines against the judge --------------------------------------------------------------
@@ -97,8 +98,8 @@ def test_every_run_is_one_by_the_interpreter_and_none_is_shorter(seed: int) -> N
     every = played.every_run(ts, tuple(ts.firsts().values()), list(stated.values()))
     assert every is not None
     assert set(every.runs) == {*true.least, *true.restarted}
-    for key, run in every.runs.items():
-        trace = trace_of(ts, stated[key], run)
+    for key, shown in every.runs.items():
+        trace = trace_of(ts, stated[key], shown)
         assert isinstance(trace, Trace)
         assert len(trace.steps) == true.least.get(key, true.restarted.get(key))
 
@@ -335,9 +336,37 @@ def test_a_bound_that_is_too_low_is_broken_by_a_run_that_waits() -> None:
     [broken] = proof.open
     every = played.every_run(ts, tuple(ts.firsts().values()), [broken])
     assert every is not None
-    run = every.runs[broken.key]
-    assert isinstance(trace_of(ts, broken, run), Trace)
-    assert len(run.taken) == 30
+    shown = every.runs[broken.key]
+    assert isinstance(trace_of(ts, broken, shown), Trace)
+    assert len(shown.taken) == 30
+
+
+WIDE = """\
+input a : int 0 .. 65535
+input b : int 0 .. 65535
+state n : int 0 .. 20
+state far : bool
+module count reads a, b, n writes n { if a + b = 70000 { n := min(n + 1, 20) } else { n := 0 } }
+table t {
+| line | n || far |
+|---|---||---|
+| near | < 5 || false |
+| far | >= 5 || true |
+}
+property few : n < 12
+level solo { period 40 [ms] preprocess count table t }
+"""
+"""Its inputs cannot be listed; a run that breaks it is longer than those that are usually looked for."""
+
+
+def test_a_longer_run_is_found_where_inputs_cannot_be_listed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["prove", str(solo_system(tmp_path, WIDE)), "--no-cache"]) == 1
+    assert (
+        "broken in cycle 12, as the interpreter, the Python and the C executors run it"
+        in capsys.readouterr().err
+    )
 
 
 def test_what_the_engines_say_falsely_is_not_believed() -> None:
@@ -402,12 +431,12 @@ def test_a_run_breaks_what_is_written_as_btor2_in_its_last_cycle_and_not_before(
     """A reader of the few forms that are written: it plays the run that the search of states has found."""
     ts = alone(LIGHT.replace("{least}", "< 30"))
     one = made(ts)
-    [run] = explicit.explored(one).runs.values()
+    [found] = explicit.explored(one).runs.values()
     lines = [line.split() for line in btor2(one).decode().splitlines()]
     state: dict[int, int] = {}
-    for number, given in enumerate(run.given, 1):
-        bad, state = played_as_btor2(lines, state, {**given, "restarts": run.begins})
-        assert bad == (number == len(run.given))
+    for number, given in enumerate(found.given, 1):
+        bad, state = played_as_btor2(lines, state, {**given, "restarts": found.begins})
+        assert bad == (number == len(found.given))
 
 
 def played_as_btor2(

@@ -30,11 +30,14 @@ from rcsc.compose.counterexample.trace import (
     trace_of,
     traces,
 )
-from rcsc.compose.exact.played import every_run
+from rcsc.compose.exact.played import every_run, further_runs
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
 from rcsc.proof.procedures.invariants import at_first
 from rcsc.run.description import Description
+
+FURTHER = 40
+"""Cycles of longer runs that are looked for where nothing else is asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +204,7 @@ def _searched(
 ) -> dict[ObligationKey, TraceResult]:
     """Run the searches one after the other, each for the obligations still open; where all states can be searched, only as far as runs go.
 
-    Then a run may be as long as it has to be, however many cycles are asked for.
+    Then a run may be as long as it has to be, however many cycles are asked for. Elsewhere longer runs are looked for with little effort.
     """
     begun = settings.starts.get(str(ts.level.name), {})
     every = None if begun else every_run(ts, tuple(ts.firsts().values()), asked)
@@ -215,6 +218,26 @@ def _searched(
         left = [obligation for obligation in asked if obligation.key not in results]
         if left:
             results |= traces(ts, left, search, gave_up)
+    left = [owed for owed in asked if owed.key not in results]
+    if every is None and left and not begun and settings.most >= USUAL:
+        return results | _further(ts, left, gave_up)
+    for owed in left:  # beyond what these searches allow a neighbour
+        if every is not None and owed.key in every.runs:
+            results[owed.key] = trace_of(ts, owed, every.runs[owed.key])
+    return results
+
+
+def _further(
+    ts: TransitionSystem, left: list[Obligation], gave_up: set[ObligationKey]
+) -> dict[ObligationKey, TraceResult]:
+    """Look for longer runs by the circuit, as far as that goes with little effort; show the simplest run of each length found."""
+    results: dict[ObligationKey, TraceResult] = {}
+    runs = further_runs(ts, tuple(ts.firsts().values()), left, FURTHER)
+    for owed in left:
+        if (run := runs.get(owed.key)) is not None:
+            search = TraceSearch(len(run.taken), restarted=run.restarted)
+            results |= traces(ts, [owed], search, gave_up)
+            results.setdefault(owed.key, trace_of(ts, owed, run))
     return results
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rcsc.compose.contract.obligations import Obligation, ObligationKey
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.exact import explicit
+from rcsc.compose.exact.bounded import looked
 from rcsc.compose.exact.circuit import Circuit, circuit
 from rcsc.compose.exact.explicit import Run
 from rcsc.lang.interpret import initial
@@ -67,6 +68,17 @@ def every_run(ts: TransitionSystem, firsts: Sequence[Cycle], wanted: Sequence[Ob
     found = explicit.explored(made)
     runs = {key: played(ts, made, run) for key, run in found.runs.items()}
     return EveryRun(runs, len(found.states) if found.complete else None)
+
+
+def further_runs(
+    ts: TransitionSystem, firsts: Sequence[Cycle], wanted: Sequence[Obligation], most: int
+) -> dict[ObligationKey, Played]:
+    """Return the shortest run that breaks each obligation, of those of at most so many cycles that bounded search finds."""
+    step = ts.cycle(ts.havoc())
+    if any(cycle.calls for cycle in (*firsts, step)):
+        return {}
+    made = circuit(ts, firsts, step, wanted)
+    return {key: played(ts, made, run) for key, run in looked(made, most).runs.items()}
 
 
 def played(ts: TransitionSystem, made: Circuit, run: Run) -> Played:

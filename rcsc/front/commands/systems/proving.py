@@ -15,7 +15,7 @@ from rcsc.base.diagnostics.source import Sources
 from rcsc.base.host.cache import Cache
 from rcsc.base.host.files import write_atomically
 from rcsc.compose.contract.beginning import BadStartError, Starts, starts
-from rcsc.compose.contract.claims import CONTRACT
+from rcsc.compose.contract.claims import CONTRACT, Key
 from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
@@ -394,6 +394,11 @@ def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProo
         raise UnwritableError(str(folder), error.strerror or "no reason given") from error
 
 
+def _how(level: LevelProof, key: Key) -> dict[str, str]:
+    """Return how a claim was proved, where an exact engine did."""
+    return {"by": dict(level.by)[key]} if key in dict(level.by) else {}
+
+
 def _as_json(
     proof: SystemProof,
     systems: dict[str, TransitionSystem],
@@ -415,7 +420,7 @@ def _as_json(
                         "table": obligation.table,
                         "name": obligation.name,
                         **claim(proof, level.level, obligation.key),
-                        "by": dict(level.by).get(obligation.key, ""),
+                        **_how(level, obligation.key),
                     }
                     for obligation, _ in level.verdicts
                 ],
