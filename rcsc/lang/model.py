@@ -676,6 +676,7 @@ class Monitor:
         defined: The state that says whether all truths of the cycle are defined; one that is not is stored as false.
         truths: Conditions on the level's leaves, as in a property; each with the state that takes its truth.
         owes: The condition that what was asked for so far is still to come: it is then broken if no other cycle follows.
+        asks: The condition that the cycle asked for the response; of what counts, that it begins.
     """
 
     states: tuple[Hidden, ...]
@@ -683,6 +684,7 @@ class Monitor:
     truths: tuple[tuple[VariableName, Expr], ...]
     statements: tuple[Statement, ...]
     owes: Expr
+    asks: Expr
 
 
 # --- tables --------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import product
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from rcsc.compose.contract.watched import begin, is_ghost, step
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import WATCHED, Property, Value
 from rcsc.lang.over_time import Watch
@@ -21,7 +23,7 @@ from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.proof.symbolic import values
 from tests.support.programs.stages import program_of, refused
-from tests.support.programs.systems import alone
+from tests.support.programs.systems import alone, solo_system
 
 LITTLE = Effort(walks=6, cycles=40)
 
@@ -285,6 +287,22 @@ def test_monitors_are_stepped_as_nodes_as_they_are_on_a_run() -> None:
 
 def _constant(ts: TransitionSystem, name: str, state: Mapping[str, Value]) -> values.Node:
     return values.constant(ts.kinds[name], state.get(name, 0))
+
+
+def test_a_requirement_that_never_asks_is_told_at_its_place(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = LEVEL.format(
+        "requirement idle : when asked and not given, at once asked\nrequirement acts : when asked, at once given"
+    )
+    path = solo_system(tmp_path, text.replace("level l", "level solo"))
+    assert run(["prove", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "but 1 requirement that never asks: status 0, and 1 with --strict" in said.splitlines()[0]
+    assert "warning[RCS760]: requirement `idle` of level `solo` is vacuous" in said
+    assert "solo.rcs:3:13" in said
+    assert "`acts` of level" not in said
+    assert run(["prove", str(path), "--strict"]) == 1
 
 
 # --- where inputs are refused ----------------------------------------------------------------

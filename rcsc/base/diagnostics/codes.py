@@ -1875,6 +1875,24 @@ class Code(StrEnum):
     so in a property over two cycles, which is proved with the others: `property broken_stays : now = broken then now = broken`. Without
     that `--strict` counts it.
     """
+    VACUOUS = """RCS760: a requirement that never asks
+
+    `rcsc prove` shows of the level in its environment that the condition of the requirement, or its scope, never comes: it is proved, and
+    says nothing. Often the condition is not what was meant, or a line is missing that would bring it about. Where it is never to come, say
+    just that: `requirement never_hot : never heat_C > 90`. `--strict` counts it.
+
+        input asked : bool
+        state waited : int 0 .. 3
+        output given : bool
+        requirement late : when waited = 3, within 1 cycles, given
+        table t {
+          | line | asked | waited || waited     | given |
+          | wait | true  | < 2    || waited + 1 | false |
+          | give | true  | >= 2   || 0          | true  |
+          | rest | false |        || 0          | false |
+        }
+        level l { table t }
+    """
     GRAPH_NO_STATE = """RCS771: a table has no state to draw
 
     `rcsc graph` draws the values of one variable as states: `cur_state`, else the only enumeration that the table tests and keeps as

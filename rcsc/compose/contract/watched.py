@@ -139,6 +139,12 @@ def monitors(program: Program) -> Iterator[tuple[Property, Monitor]]:
             yield stated, stated.monitor
 
 
+def asking(program: Program, after: Leaves) -> Iterator[tuple[str, Node]]:
+    """Yield the name of each requirement over time, and the condition that a cycle asked for its response."""
+    for stated, monitor in monitors(program):
+        yield stated.name, true(monitor.asks, after)
+
+
 def first_ghosts(program: Program) -> Leaves:
     """Return the states of all monitors before the first cycle."""
     return {

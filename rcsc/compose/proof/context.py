@@ -8,6 +8,7 @@ In: a transition system, and what was confirmed of it. Out: a `Context`:
   Section 9 requires that there are none: each line does the same until its command is echoed.
 - *restless*: whether the level would give order after order on constant inputs.
 - *never*, *traps*: why lines are never reached, and which states nothing leaves (`stuck`).
+- *vacuous*: requirements over time whose response no reachable cycle asks for: proved, and say nothing.
 
 Each question is answered by Z3 from the invariant; what is not refuted is named, so the lists are never too short.
 """
@@ -19,9 +20,11 @@ from typing import TypeAlias
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.walk import reached_further
+from rcsc.compose.contract.watched import asking, monitors
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.stuck import NeverReached, Trap, traps, why_never
+from rcsc.lang.interpret import holds
 from rcsc.lang.leaves import may_write
 from rcsc.lang.model import Bool, Default, Kind, Value
 from rcsc.proof.solvers import smt
@@ -48,6 +51,7 @@ class Context:
         unreached: Tables and lines that no reachable cycle runs; `unsure`, those neither shown to be so nor seen to run.
         orders: Whether the level gives orders; else nothing is repeated.
         never: Why the unreached lines are; `traps`, states that nothing leaves.
+        vacuous: Names of requirements that never ask.
     """
 
     unreached: tuple[tuple[str, str], ...]
@@ -57,6 +61,7 @@ class Context:
     orders: bool = True
     never: tuple[NeverReached, ...] = ()
     traps: tuple[Trap, ...] = ()
+    vacuous: tuple[str, ...] = ()
 
 
 LineName: TypeAlias = tuple[str, str]
@@ -95,6 +100,7 @@ def context(
         bool(ts.links.below),
         tuple(why_never(ts, asked, clauses, unreached)),
         tuple(traps(ts, asked, clauses, {*ran, *further})),
+        tuple(_vacuous(ts, asked, every)),
     )
 
 
@@ -106,6 +112,41 @@ def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Lin
         for line, when in _lines(asked.cycle)
         if line not in ran and may(solver, asked.keyed.term(when))
     ]
+
+
+def never_asked(
+    ts: TransitionSystem,
+    asked: Confirmation,
+    clauses: Sequence[Clause],
+    states: Sequence[Mapping[str, Value]],
+) -> list[Node]:
+    """List the conditions that a requirement never asks, for those that asked on no walk and that the clauses allow to ask."""
+    if not states:
+        return []
+    solver = asked.known(clauses)
+    walked = {
+        stated.name
+        for stated, monitor in monitors(ts.program)
+        if any(holds(monitor.asks, state) for state in states)
+    }
+    return [
+        values.negation(asks)
+        for name, asks in asking(ts.program, asked.cycle.after)
+        if name not in walked and may(solver, asked.keyed.term(asks))
+    ]
+
+
+def _vacuous(ts: TransitionSystem, asked: Confirmation, every: Sequence[_Start]) -> Iterator[str]:
+    """Yield the requirements that are refuted to ask in any cycle."""
+    terms = [
+        {name: asked.keyed.term(asks) for name, asks in asking(ts.program, start.cycle.after)}
+        for start in every
+    ]
+    for start in every:
+        start.solver.add(*asked.keyed.ranges)
+    for name in terms[0]:
+        if not any(may(start.solver, term[name]) for start, term in zip(every, terms, strict=True)):
+            yield name
 
 
 def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_Start]:

@@ -31,7 +31,7 @@ from rcsc.compose.invariant.search import (
     strengthened,
 )
 from rcsc.compose.proof.candidates import Candidates, candidates, content, keep_candidates
-from rcsc.compose.proof.context import Context, context, never_run
+from rcsc.compose.proof.context import Context, context, never_asked, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Limits
@@ -357,7 +357,8 @@ def _confirmed_of(posed: _Posed, invariant: FoundInvariant, *, exact: bool = Fal
     others = flow.wanted_to_stand() if looks or stands else []
     if looks:
         lines = never_run(asked, invariant.clauses, invariant.ran)
-        others = [*flow.no_loop_steps(), *others, *lines]
+        idle = never_asked(ts, asked, invariant.clauses, invariant.states)
+        others = [*flow.no_loop_steps(), *others, *lines, *idle]
     if others:
         found = invariant.clauses
         invariant = strengthened(ts, posed.firsts, posed.cycle, invariant, others)

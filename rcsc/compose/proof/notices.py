@@ -1,4 +1,4 @@
-"""Warnings about a level in its system: lines that are never reached, and states that nothing leaves, each at its place in the text.
+"""Warnings about a level in its system, each at its place: lines never reached, states that nothing leaves, requirements that never ask.
 
 In: transition systems, and the proof of their levels. Out: `Diagnostic`s. They repeat what `context` found, and trust what that trusts.
 """
@@ -28,6 +28,7 @@ def notices(systems: Mapping[str, TransitionSystem], whole: SystemProof) -> Iter
             for trap in proof.context.traps:
                 if not trap.stated:
                     yield _never_left(ts, trap)
+            yield from _vacuous(ts, proof.context)
 
 
 def condition_of(trap: Trap) -> str:
@@ -125,6 +126,24 @@ def _never_left(ts: TransitionSystem, trap: Trap) -> Diagnostic:
         ),
         severity=Severity.WARNING,
     )
+
+
+def _vacuous(ts: TransitionSystem, seen: Context) -> Iterator[Diagnostic]:
+    """Yield a warning for each requirement that never asks."""
+    for stated in ts.program.properties:
+        if stated.name in seen.vacuous:
+            yield Diagnostic(
+                Code.VACUOUS,
+                f"requirement `{stated.name}` of level `{ts.level.name}` is vacuous: no cycle asks for its response",
+                Label(stated.span),
+                notes=(
+                    "it is kept by whatever the level does: its condition never comes, or its scope never begins",
+                ),
+                help=(
+                    "look whether its condition says what is meant; if it is never to come, say so: `never ...`",
+                ),
+                severity=Severity.WARNING,
+            )
 
 
 def _name(line: Line | Default, said: str = "") -> Label:

@@ -52,7 +52,9 @@ def monitored(past: Past, required: Requirement) -> tuple[Monitor, Expr]:
     broken, owes = made.timing(required, in_scope, asks)
     if required.scope is Scope.BETWEEN:
         broken, owes = made.once_ended(in_scope, broken), FALSE
-    monitor = Monitor(tuple(made.states), defined.name, tuple(made.truths), tuple(made.statements), owes)
+    monitor = Monitor(
+        tuple(made.states), defined.name, tuple(made.truths), tuple(made.statements), owes, made.asks
+    )
     return monitor, both(defined.now, negation(broken))
 
 
@@ -70,7 +72,13 @@ class _InScope:
 
 @dataclass(slots=True)
 class _Made(Past):
-    """A monitor in the making, of which the states are there that the conditions need."""
+    """A monitor in the making, of which the states are there that the conditions need.
+
+    Attributes:
+        asks: The condition that the cycle asked for the response; of what counts, that it begins.
+    """
+
+    asks: Expr = TRUE
 
     def stored(self, part: str, condition: Expr) -> State:
         """Add the state that takes the truth of a condition of the requirement."""
@@ -133,7 +141,7 @@ class _Made(Past):
             return self._at_most(required, scope), FALSE
         response = self.stored("response", required.response).now
         question = self.flag("asked", lambda _: asks)
-        asked = question.now
+        asked = self.asks = question.now
         if required.scope.only and timing is Timing.EXACTLY_AFTER:
             return self._not_exactly_after(required, scope, asked, response)
         if timing is Timing.NEVER:
@@ -205,7 +213,7 @@ class _Made(Past):
         """Count down from each of the last beginnings: none of so many is to be within the time of another."""
         response = self.stored("response", required.response)
         begins = both(scope.inside, response.now, negation(both(scope.was_inside, response.was)))
-        begun = self.flag("begun", lambda _: begins).now
+        begun = self.asks = self.flag("begun", lambda _: begins).now
         left = [
             self.state(f"left {at}", Int(0, required.cycles - 1), 0) for at in range(1, required.times + 1)
         ]

@@ -195,8 +195,14 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),
         "never left": sum(not trap.stated for seen in contexts for trap in seen.traps),
+        "that never asks": sum(len(seen.vacuous) for seen in contexts),
     }
-    nouns = {"not shown to end": "command", "never reached": "line", "never left": "state"}
+    nouns = {
+        "not shown to end": "command",
+        "never reached": "line",
+        "never left": "state",
+        "that never asks": "requirement",
+    }
     return (f"{counted(many, nouns.get(what, 'claim'))} {what}" for what, many in counts.items() if many)
 
 
