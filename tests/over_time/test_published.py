@@ -1,6 +1,7 @@
 """Requirements that NASA published with FRET, as the language says them: against the formulas that were published with them.
 
-The formulas are judged by an evaluator that shares nothing with rcsc (`formulas`), their comparisons of numbers by Python.
+The formulas are judged by an evaluator that shares nothing with rcsc (`formulas`), their comparisons of numbers by Python. What FRET's
+`preBool(false, ...)` says of the first cycle, the values say here with which the level begins: those of which the condition is false.
 """
 
 import re
@@ -109,9 +110,13 @@ def published(row: dict[str, str], traces: list[Trace]) -> list[list[bool]]:
     return [[bool(truth >> at & 1) for truth in truths] for at in range(len(traces))]
 
 
-def watched(stated: Property, trace: Trace) -> Iterator[bool]:
-    """What the monitor says after each cycle."""
-    watch, kept, before = Watch(stated), True, trace[0]
+def watched(stated: Property, trace: Trace, *, begins: bool) -> Iterator[bool]:
+    """What the monitor says after each cycle, of a level that begins with these truths: in its first cycle `was` finds them."""
+    watch, kept, before = (
+        Watch(stated),
+        True,
+        {name: begins if isinstance(value, bool) else 0.0 for name, value in trace[0].items()},
+    )
     for cycle in trace:
         kept = watch.keeps(before, cycle) and kept
         before = cycle
@@ -143,6 +148,6 @@ def test_a_published_requirement_means_what_its_formula_says(name: str) -> None:
         traces = [drawn(row, random, length) for _ in range(many)]
         traces = [trace for trace in traces if not divides_by_zero(row, trace)]
         for trace, says in zip(traces, published(row, traces), strict=True):
-            assert [*watched(stated, trace)] == says, trace
+            assert [*watched(stated, trace, begins=name.endswith("STAY_OFF"))] == says, trace
             verdicts.add(says[-1])
     assert verdicts == {True, False}, "the traces exercise it"
