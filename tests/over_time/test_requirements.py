@@ -305,6 +305,19 @@ def test_a_requirement_that_never_asks_is_told_at_its_place(
     assert run(["prove", str(path), "--strict"]) == 1
 
 
+def test_a_run_shows_how_a_requirement_asks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """30 ms are three cycles after the one in which it begins; of what never asks there is none."""
+    said = "requirement late : when asked for 30 [ms], at once given\nrequirement idle : when asked and not given, at once asked"
+    path = solo_system(tmp_path, LEVEL.format(said).replace("level l", "level solo"))
+    assert run(["prove", str(path), "--show", "solo.late"]) == 0
+    shown = capsys.readouterr().out
+    assert "requirement `late` of level `solo` asks in cycle 4" in shown
+    assert "! it asks" in shown
+    assert run(["prove", str(path), "--show", "late", "--show", "idle"]) == 1
+    assert "requirement `idle` of level `solo`: no run was found" in capsys.readouterr().out
+    assert run(["prove", str(path), "--show", "gone"]) == 2
+
+
 # --- where inputs are refused ----------------------------------------------------------------
 
 GAUGE = """\

@@ -11,7 +11,7 @@ from pathlib import Path
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.children import scratch
 from rcsc.compose.contract.beginning import Starts
-from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, counts_on, pairs
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, counts_on, obligations, pairs
 from rcsc.compose.contract.properties import invariant_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.applied import Texts
@@ -24,6 +24,7 @@ from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_i
 from rcsc.compose.counterexample.trace import (
     USUAL,
     NotReproducedError,
+    Trace,
     TraceResult,
     TraceSearch,
     stopping,
@@ -33,6 +34,8 @@ from rcsc.compose.counterexample.trace import (
 from rcsc.compose.exact.played import every_run, further_runs
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
+from rcsc.lang.model import Property
+from rcsc.lang.over_time.past import negation
 from rcsc.proof.procedures.invariants import at_first
 from rcsc.run.description import Description
 
@@ -239,6 +242,19 @@ def _further(
             results |= traces(ts, [owed], search, gave_up)
             results.setdefault(owed.key, trace_of(ts, owed, run))
     return results
+
+
+def exercising(ts: TransitionSystem, stated: Property, settings: TraceSettings) -> Finding | None:
+    """Find the shortest run that asks for the response of a requirement over time, in the last cycle; None where none is found.
+
+    It is a run that breaks the property that nothing asks.
+    """
+    assert stated.monitor is not None
+    silent = Property(f"{stated.name} asks", negation(stated.monitor.asks), "")
+    asked = ts.of(replace(ts.program, properties=(*ts.program.properties, silent)))
+    [owed] = [each for each in obligations(asked, asked.cycle(asked.havoc())) if each.name == silent.name]
+    result = _searched(asked, [owed], settings, set()).get(owed.key)
+    return of_trace(asked, owed, result) if isinstance(result, Trace) else None
 
 
 def _pairs(

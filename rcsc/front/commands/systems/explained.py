@@ -3,7 +3,7 @@
 import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import click
@@ -200,14 +200,14 @@ def _run(systems: Mapping[str, TransitionSystem], finding: Finding | None) -> tu
     return () if finding is None else (*beginnings(systems, finding), *rows(systems, finding))
 
 
-def _say_time_line(shown: Sequence[TimeLineRow]) -> None:
+def _say_time_line(shown: Sequence[TimeLineRow], *, err: bool = True) -> None:
     if not shown:
         return
     with io.StringIO() as text:
         Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(shown))
         click.echo(
             "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
-            err=True,
+            err=err,
         )
 
 
@@ -240,6 +240,14 @@ def _time_line(shown: Sequence[TimeLineRow]) -> Table:
 def _unbroken(text: str) -> str:
     """Keep a text on one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
     return text.replace(" ", _HARD) if len(text) <= _LONG else text
+
+
+def say_exercise(systems: Mapping[str, TransitionSystem], finding: Finding, name: str) -> None:
+    """Print a run that asks for the response of a requirement, and in which cycle it does."""
+    *before, last = _run(systems, finding)
+    begins = ", after a restart" if finding.restarted else ""
+    click.echo(f"requirement `{name}` of level `{finding.level}` asks in cycle {finding.broken_at}{begins}")
+    _say_time_line((*before, replace(last, wrong="it asks")), err=False)
 
 
 def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:

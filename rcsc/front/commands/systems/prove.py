@@ -60,6 +60,8 @@ Examples:
 @click.option("--export", "exports", type=(click.Choice(["aiger", "btor2"]), click.Path(file_okay=False, path_type=Path)),
               default=None, metavar="aiger|btor2 DIR",
               help="Write each level, exact, and what it owes to DIR for another model checker, and prove nothing.")  # fmt: skip
+@click.option("--show", "shows", multiple=True, metavar="NAME",
+              help="Print a run that asks for the response of the requirement over time NAME, and prove nothing (repeatable).")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--progress", is_flag=True,
               help="Print each level on standard error once it is done; a terminal always shows it.")  # fmt: skip
@@ -71,7 +73,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int | None,
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
-    certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None,
+    certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None, shows: tuple[str, ...],
     no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
@@ -98,7 +100,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if (
         cache is not None
         and path is not None
-        and not (logs or freeze or certificate or confirms or exports or progress)
+        and not (logs or freeze or certificate or confirms or exports or shows or progress)
     ):
         known = recall_lines(cache, path, key)
         if known is not None:
@@ -110,12 +112,15 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         exported,
         proved,
         run_cases,
+        shown_by_runs,
     )
 
     if path is None:
         return run_cases(cases)
     if exports is not None:
         return exported(path, only, *exports)
+    if shows:
+        return shown_by_runs(path, shows, cycles)
     asked = Asked(
         only, steps, jobs, cycles, further, begins, logs, freeze, variants, certificate, confirms, progress, strict, invariants,
         as_json,

@@ -19,7 +19,7 @@ from rcsc.compose.contract.claims import CONTRACT, Key
 from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
-from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings, exercising, explain, file_name
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.exact.circuit import circuit
@@ -55,7 +55,7 @@ from rcsc.front.commands.shared.proved import (
 )
 from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, wants_color
 from rcsc.front.commands.shared.stopped import say_error
-from rcsc.front.commands.systems.explained import explanation_as_json, say_explanation
+from rcsc.front.commands.systems.explained import explanation_as_json, say_exercise, say_explanation
 from rcsc.lang.model import Kind
 from rcsc.proof.solvers.options import Limits
 from rcsc.run.description import Description, description
@@ -132,6 +132,34 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         keep_lines(
             cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked, sources)), stood, loaded
         )
+    return status
+
+
+def shown_by_runs(path: Path, names: tuple[str, ...], length: int | None) -> int:
+    """Print for each requirement over time, `NAME` or `LEVEL.NAME`, a run that asks for its response; 1 where none was found of one."""
+    systems = read_systems(path)[0]
+    usual = usual_length(systems.values()) if length is None else length
+    settings = TraceSettings(description(path), usual)
+    status = 0
+    for name in names:
+        level, _, plain = name.rpartition(".")
+        places = [
+            (ts, stated)
+            for owner, ts in systems.items()
+            for stated in ts.program.properties
+            if stated.monitor is not None and stated.name == plain and level in {"", owner}
+        ]
+        if not places:
+            raise click.UsageError(f"no level has a requirement over time `{name}`")
+        for ts, stated in places:
+            finding = exercising(ts, stated, settings)
+            if finding is None:
+                click.echo(
+                    f"requirement `{stated.name}` of level `{ts.level.name}`: no run was found that asks for its response"
+                )
+                status = 1
+            else:
+                say_exercise(systems, finding, stated.name)
     return status
 
 
