@@ -8,7 +8,7 @@ import pytest
 
 from rcsc.base.diagnostics.alike import Alike, folded
 from rcsc.front.commands import run
-from tests.support.programs.systems import solo_system
+from tests.support.programs.systems import small_system, solo_system
 from tests.support.programs.texts import level, table
 
 WAITS = (
@@ -88,3 +88,56 @@ def test_a_wait_within_a_run_is_folded_and_the_log_keeps_every_cycle(
     assert text.count("<figure") == 5
     assert run(["replay", str(log), "--generated", str(found / "generated"), "--executor", "python"]) == 0
     assert "32" in capsys.readouterr().out
+
+
+# --- open claims -----------------------------------------------------------------------------
+
+TEN = table(
+    "ten", "line | now | ticks || procedures | now",
+    *(f"l{at} | {at} | || tick | {(at + 1) % 10}" for at in range(10)), "late | | > 30 || tick |",
+).replace("table ten {", "table ten assuming calm {")  # fmt: skip
+COUNTS = (
+    "state now : int 0 .. 9\nstate ticks : int 0 .. 60\nassume calm monitored : ticks < 20\n"
+    f"procedure tick {{ ticks := min(ticks + 1, 60) }}\n{TEN}{level('solo', 'ten')}"
+)
+
+
+def test_an_open_claim_says_what_was_looked_at_where_it_stops_and_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The state by name, and the length of run to ask for, with which the run is found; none of the pairs of ten lines is listed."""
+    path = solo_system(tmp_path, COUNTS)
+    assert run(["prove", str(path), "--no-cache"]) == 1
+    said = capsys.readouterr().err
+    [_, calm, one_line] = said.split("error[RCS751]: ")
+    assert calm.startswith("level `solo`, table `ten`: not proved: assumption `calm`\n")
+    assert (
+        "no run of 8 cycles or fewer breaks it: all of them were looked at, from the first values, and after a restart"
+        in calm
+    )
+    assert "whether that is ever reached is not known: `now` = 0, `ticks` = 19" in calm
+    assert "`--trace 27`" in calm
+    assert '`--where "solo.now = 0, solo.ticks = 19"`' in calm
+    assert "`invariant not_there : not (now = 0 and ticks = 19)`" in calm
+    assert one_line.startswith("level `solo`, table `ten`: not proved: no two lines match\n")
+    assert one_line.count(" and late") == 1, (
+        "the state at which it stops shows one pair, and no other is listed"
+    )
+    assert run(["prove", str(path), "--no-cache", "--trace", "27"]) == 1
+    assert "broken in cycle 21" in capsys.readouterr().err
+
+
+def test_a_loop_is_told_by_its_lines_and_states(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where a run comes to it, and where no run is long enough, from a state that is not excluded."""
+    asked = ["prove", str(small_system(tmp_path)), "--no-cache", "--level", "lower"]
+    assert run(asked) == 0
+    said = capsys.readouterr().err
+    assert "goes round from cycle 3 to the end of cycle 3" in said
+    assert "the loop: line `2` at `new_command` = false, `cur_state` = going" in said
+    assert run([*asked, "--trace", "2"]) == 0
+    said = capsys.readouterr().err
+    assert "no run of 2 cycles or fewer is one that comes round" in said
+    assert (
+        "the proof stops here, at a state that it does not exclude, from where it would go round: line `2` at"
+        in said
+    )

@@ -41,6 +41,8 @@ from rcsc.run.description import Description
 
 FURTHER = 40
 """Cycles of longer runs that are looked for where nothing else is asked for."""
+LONGEST_LAP = 5
+"""Cycles of a lasso that is looked for where a command is not shown to end, from any state that is not excluded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class Explanation:
         guessed: Whether that is no bug, because arithmetic was left open (`keyed`).
         helps: Suggested repairs of the table, each with whether it is proved of the text that it makes.
         log: Where the run is kept.
-        others: Pairs of lines of the same table that no run shows.
+        others: Where a run shows a pair of lines, the other pairs of the same table, which none shows.
         in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give a result that no C function can.
         supposed: A cycle that would break it, from a state that the proof does not exclude and nobody has seen reached; None where
             there is a finding, or none was looked for.
@@ -170,7 +172,7 @@ def _level(
         if obligation.key in parted:
             every_pair = [
                 replace(each, gave_up=any(part.key in gave_up for part in parted[obligation.key]))
-                for each in _pairs(ts, obligation, parted[obligation.key], results)
+                for each in _pairs(ts, obligation, parted[obligation.key], results, proof)
             ]
             yield from _with_repairs(ts, every_pair, proof, settings, texts)
         else:
@@ -196,7 +198,7 @@ def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]
 
 def _supposed(ts: TransitionSystem, obligation: Obligation, proof: LevelProof) -> Finding | None:
     """Find a cycle that breaks an obligation of which no run is known, from a state that the invariant leaves open."""
-    if proof.verdict(*obligation.key) is not Verdict.NOT_PROVED or not proof.clauses:
+    if proof.verdict(*obligation.key) is not Verdict.NOT_PROVED:
         return None
     trace = stopping(ts, obligation, proof.predicates, proof.clauses)
     return None if trace is None else of_trace(ts, obligation, trace)
@@ -262,12 +264,13 @@ def _pairs(
     obligation: Obligation,
     parted: list[Obligation],
     results: Mapping[ObligationKey, TraceResult],
+    proof: LevelProof,
 ) -> Iterator[Explanation]:
     """Explain each pair of lines that both match in some run; the table as a whole if no pair does."""
     shown = [pair for pair in parted if pair.key in results]
     others = tuple(pair.name for pair in parted if pair.key not in results)
     if not shown:
-        yield Explanation(ts.level.name, obligation, others=others)
+        yield Explanation(ts.level.name, obligation, supposed=_supposed(ts, obligation, proof))
     for at, pair in enumerate(shown):
         yield replace(
             _explanation(ts, pair, results[pair.key]), others=others if at == len(shown) - 1 else ()
@@ -360,7 +363,19 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
                     proof.level, obligation, replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
                 )
             case other:
-                yield replace(_explanation(ts, obligation, other), notes=open_endings[table].rounds)
+                found = _explanation(ts, obligation, other)
+                supposed_lap = _supposed_lap(ts, table, proof) if other is None and settings.most else None
+                yield replace(found, notes=open_endings[table].rounds, supposed=supposed_lap)
+
+
+def _supposed_lap(ts: TransitionSystem, table: str, proof: LevelProof) -> Finding | None:
+    """Find a lasso of the table's command from a state that the invariant leaves open; none longer than a few cycles is looked for."""
+    search = TraceSearch(LONGEST_LAP, invariant=(proof.predicates, proof.clauses))
+    lasso = lassos(ts, [table], search).get(table)
+    obligation = obligation_of(table)
+    if not isinstance(lasso, Lasso):
+        return None
+    return replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
 
 
 @dataclass(slots=True)

@@ -9,7 +9,7 @@ from itertools import groupby
 
 from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
+from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle, seen_by_table
 from rcsc.compose.counterexample.trace import Trace
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, key_bounds, key_of, spell
@@ -181,6 +181,40 @@ def rows(systems: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Tim
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )
+
+
+def state_of(ts: TransitionSystem, finding: Finding) -> dict[str, str]:
+    """Return the level's own values before the first cycle of a run: those that its line tests, and those that are not initial."""
+    start, usual = finding.start(finding.level), initial(ts.program)
+    step = finding.ticks[0][finding.level]
+    line = next((line for line in ts.table(step.table).lines if line.name == step.line), None)
+    tests = () if line is None else line.stated
+    tested = {str(name) for test in tests for name in test.variables}
+    return {
+        name: spell(ts.kinds[name], start[name])
+        for name, value in usual.items()
+        if name not in step.taken and (name in tested or start[name] != value)
+    }
+
+
+def lap_of(ts: TransitionSystem, finding: Finding) -> list[str]:
+    """Spell a lasso: of each of its cycles table and line, with the level's own values that the line tests; repetitions are left out."""
+    laps = []
+    for tick in finding.ticks[finding.lasso - 1 :]:
+        step = tick[finding.level]
+        seen = seen_by_table(ts, step)
+        line = next((line for line in ts.table(step.table).lines if line.name == step.line), None)
+        tested = dict.fromkeys(
+            str(name)
+            for test in (line.stated if line else ())
+            for name in test.variables
+            if name not in step.taken
+        )
+        state = ", ".join(
+            f"`{name}` = {spell(ts.kinds[name], seen[name])}" for name in tested if seen is not None
+        )
+        laps.append(f"line `{step.line}`" + (f" at {state}" if state else ""))
+    return list(dict.fromkeys(laps))
 
 
 def beginnings(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:

@@ -274,15 +274,32 @@ class Flow:
         for part, waits in phases.loops:
             if waits:
                 moving = [at for at in range(len(phases.leaves)) if len({phase[at] for phase in part}) > 1]
-                yield "; ".join(
+                states = "; ".join(
                     ", ".join(
                         f"`{phases.leaves[at]}` = {spell(self.ts.kinds[phases.leaves[at]], phase[at])}"
                         for at in moving
                     )
                     for phase in sorted(part)
                 )
+                lines = ", ".join(f"`{line}`" for line in self._lines_in(number, part))
+                yield f"{states} (lines {lines})"
         if phases.steps is None:
-            yield f"its states are more than {MOST_STEPS} steps apart, or the solver gave up"
+            told = ", ".join(f"`{leaf}`" for leaf in phases.leaves)
+            yield f"more than {MOST_STEPS} steps, or some on which the solver gave up, between the values of {told}"
+
+    def _lines_in(self, number: int, part: set[Phase]) -> Iterator[str]:
+        """Yield the lines that may run in a cycle which stays in a loop of phases and leaves the command unanswered."""
+        asked, leaves = self.staying(number), self._phases(number).leaves
+        cycle, solver = asked.cycle, asked.known(self.clauses)
+        inside = (
+            values.any_of(values.all_of(_are(nodes, phase)) for phase in sorted(part))
+            for nodes in _ends(cycle, leaves)
+        )
+        waits = command_stays(self.ts, cycle), unanswered(self.ts, cycle)
+        stays = asked.keyed.term(values.all_of((cycle.tables[number].chosen, *waits, *inside)))
+        runs = [(str(line.name), asked.keyed.term(match)) for line, match in cycle.tables[number].lines]
+        solver.add(stays, *asked.keyed.ranges)
+        yield from (name for name, match in runs if may(solver, match))
 
     def no_loop_steps(self) -> list[Node]:
         """List the conditions to be proved: for each step on a loop of phases, that it is not taken."""

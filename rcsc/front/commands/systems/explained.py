@@ -13,15 +13,30 @@ from rich.table import Table
 
 from rcsc.base.diagnostics.alike import Alike, folded
 from rcsc.base.diagnostics.codes import Code
+from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
-from rcsc.compose.counterexample.explain import Explanation, runs_on_executors
-from rcsc.compose.counterexample.finding import Finding, TimeLineRow, beginnings, by_tick, rows
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings, runs_on_executors
+from rcsc.compose.counterexample.finding import (
+    Finding,
+    TimeLineRow,
+    beginnings,
+    by_tick,
+    lap_of,
+    rows,
+    state_of,
+)
+from rcsc.compose.counterexample.trace import USUAL
 from rcsc.front.commands.shared.stopped import attach, say_error
+from rcsc.lang.model import Int, Kind
 
 ALIKE = 2
 """Consequences of one kind that are shown with their runs; others differ in a reason only, and are told in a line."""
+MOST_OF_A_LAP = 6
+"""Cycles of a loop that are told in words."""
+MOST_CYCLES = 1000
+"""The longest run that `--trace` looks for."""
 _WIDTH = 118
 """Columns of a time line."""
 _LONG = 33
@@ -31,9 +46,10 @@ _HARD = "\ue000"
 
 
 def say_explanation(
-    systems: Mapping[str, TransitionSystem], explanation: Explanation, cycles: int, further: int
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, settings: TraceSettings
 ) -> None:
-    """Print an unproved claim; runs of up to `cycles` cycles were searched, and followed on for up to `further`."""
+    """Print an unproved claim, as runs were searched for it."""
+    cycles, further = settings.most, settings.further
     where = f"level `{explanation.level}`" + (
         f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
     )
@@ -66,23 +82,71 @@ def say_explanation(
             "what rests on it says nothing",
         )
     elif cycles and not explanation.beside:
-        attach("note", _no_run(systems[explanation.level], explanation, cycles))
+        attach("note", _no_run(systems[explanation.level], explanation, settings))
         _say_supposed(systems, explanation)
-    _say_notes(explanation, cycles)
-    for line in explanation.helps:
+    _say_notes(explanation)
+    for line in (*explanation.helps, *next_steps(systems[explanation.level], explanation, settings)):
         attach("help", line)
     if explanation.together:
         attach("note", explanation.together)
     if explanation.others:
-        attach("note", f"no such run was found of both of lines {', '.join(explanation.others)}")
+        attach("note", f"of {counted(len(explanation.others), 'other pair')} of lines no such run was found")
     _say_logs(explanation)
 
 
-def _no_run(ts: TransitionSystem, explanation: Explanation, cycles: int) -> str:
-    """Report that no run was found, or that none was looked for."""
-    among = " among those in which no input is refused" if ts.refusable else ""
-    gave_up = "; the solver gave up on some" if explanation.gave_up else ""
-    return f"no run of {cycles} cycles or fewer was found{among}{gave_up}; `--trace N` looks for longer ones"
+def _no_run(ts: TransitionSystem, explanation: Explanation, settings: TraceSettings) -> str:
+    """Report what was looked at without finding a run."""
+    cycles = counted(settings.most, "cycle")
+    where = "from the values of --where" if any(settings.starts.values()) else "from the first values"
+    if where.endswith("first values"):
+        linked = ts.links.above is not None or ts.links.below
+        where += ", and after a restart" + (" beside neighbours that are in step" if linked else "")
+    among = " in which no input is refused" if ts.refusable else ""
+    if explanation.gave_up:
+        return f"no run of {cycles} or fewer was found; the solver gave up on some of those"
+    what = "is one that comes round" if explanation.warns else "breaks it"
+    return f"no run of {cycles} or fewer {what}: all of them{among} were looked at, {where}; longer ones were not"
+
+
+def next_steps(ts: TransitionSystem, explanation: Explanation, settings: TraceSettings) -> list[str]:
+    """List what to do about a claim that is neither proved nor broken by a run, with names and values to type."""
+    if explanation.finding is not None or explanation.beside or not settings.most:
+        return []
+    state = {} if explanation.supposed is None else state_of(ts, explanation.supposed)
+    steps = []
+    if settings.most < MOST_CYCLES:
+        steps.append(f"look at longer runs: `--trace {_longer(ts, state, settings.most)}`")
+    if state:
+        values = ", ".join(f"{explanation.level}.{name} = {value}" for name, value in state.items())
+        steps.append(
+            f'if that state is reached, have the table do otherwise there; to play on from it: `--where "{values}"`'
+        )
+    nameable = {
+        str(leaf)
+        for declared in ts.program.declared
+        if declared.kind is not Kind.INPUT
+        for leaf in declared.leaves
+    }
+    own = " and ".join(f"{name} = {value}" for name, value in state.items() if name in nameable)
+    if own:
+        steps.append(
+            f"if it is not, say so, or why: `invariant not_there : not ({own})` is proved, and used here, "
+            "or told with the run that comes to it"
+        )
+    return steps
+
+
+def _longer(ts: TransitionSystem, state: Mapping[str, str], cycles: int) -> int:
+    """Return how many cycles to look at next.
+
+    As many as all times of the level take one after the other, or as the greatest number counts of the state at which the proof stops;
+    where that was looked at, some times more.
+    """
+    times = (v.type for v in ts.program.variables if v.counts is not None)
+    counts = (int(said) for name, said in state.items() if isinstance(ts.kinds[name], Int))
+    wanted = (sum(kind.high for kind in times if isinstance(kind, Int)), max(counts, default=0))
+    longer = max(wanted) + USUAL
+    return min(MOST_CYCLES, longer if longer > cycles else 4 * cycles)
 
 
 def _say_logs(explanation: Explanation) -> None:
@@ -109,16 +173,12 @@ def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -
     )
 
 
-def _say_notes(explanation: Explanation, cycles: int) -> None:
+def _say_notes(explanation: Explanation) -> None:
     """Print what is known without a run."""
     for note in explanation.notes:
         attach("note", note)
     if explanation.notes and explanation.warns:
-        attach(
-            "help",
-            "let the lines count: a number that only falls, or only rises, while they run; "
-            f"`--trace {4 * cycles}` looks at longer runs",
-        )
+        attach("help", "let the lines count: a number that only falls, or only rises, while they run")
 
 
 def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
@@ -133,7 +193,7 @@ def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanati
     elif not in_c:
         run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
     what = (
-        f"goes round from cycle {finding.lasso} to cycle {finding.broken_at}"
+        f"goes round from cycle {finding.lasso} to the end of cycle {finding.broken_at}"
         if finding.lasso
         else f"broken in cycle {finding.broken_at}"
     )
@@ -145,6 +205,8 @@ def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanati
             for owner, names in explanation.supposes.items()
         )
         attach("note", f"supposed, and not shown of the system: {gives}")
+    if finding.lasso:
+        attach("note", f"the loop: {_lap(systems, finding)}")
     _say_time_line(_run(systems, finding))
 
 
@@ -153,15 +215,23 @@ def _say_supposed(systems: Mapping[str, TransitionSystem], explanation: Explanat
     finding = explanation.supposed
     if finding is None:
         return
+    state = ", ".join(
+        f"`{name}` = {value}" for name, value in state_of(systems[finding.level], finding).items()
+    )
+    lap = f", from where it would go round: {_lap(systems, finding)}" if finding.lasso else ""
     attach(
         "note",
-        "the proof stops here, at a state that it does not exclude; whether that is ever reached is not known",
+        f"the proof stops here, at a state that it does not exclude{lap}; whether that is ever reached is not known: "
+        f"{state or 'all is as at first'}",
     )
     _say_time_line(_run(systems, finding))
-    attach(
-        "help",
-        "if it is reached, the table has to do otherwise there; if not, an `invariant` that says why is proved, and used here",
-    )
+
+
+def _lap(systems: Mapping[str, TransitionSystem], finding: Finding) -> str:
+    """Spell the loop of a lasso; of a long one the first cycles."""
+    laps = lap_of(systems[finding.level], finding)
+    more = f", and {len(laps) - MOST_OF_A_LAP} more" if len(laps) > MOST_OF_A_LAP else ""
+    return "; then ".join(laps[:MOST_OF_A_LAP]) + more
 
 
 def _say_consequences(
@@ -250,7 +320,9 @@ def say_exercise(systems: Mapping[str, TransitionSystem], finding: Finding, name
     _say_time_line((*before, replace(last, wrong="it asks")), err=False)
 
 
-def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
+def explanation_as_json(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation, settings: TraceSettings
+) -> dict[str, Any]:
     """Return an unproved claim, its run and its consequences, as JSON."""
     finding = explanation.finding
     return {
@@ -269,6 +341,7 @@ def explanation_as_json(systems: Mapping[str, TransitionSystem], explanation: Ex
         "lap": 0 if finding is None else finding.lasso,
         "time_line": [asdict(row) for row in _run(systems, finding)],
         "supposed": [asdict(row) for row in _run(systems, explanation.supposed)],
+        "next": next_steps(systems[explanation.level], explanation, settings),
         "follows": [
             {
                 "how": then.how.value,

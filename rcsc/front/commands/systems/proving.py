@@ -120,7 +120,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         _say(_lines(path, systems, proof, asked, sources))
     explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
-        _say(_lines(path, systems, proof, asked, sources, explanations))
+        found = [explanation_as_json(systems, explanation, settings) for explanation in explanations]
+        _say(_lines(path, systems, proof, asked, sources, found))
     for agreement in (each for each in proof.agreements if not each.holds):
         say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
@@ -204,11 +205,11 @@ def _lines(
     proof: SystemProof,
     asked: Asked,
     sources: Sources,
-    explanations: Sequence[Explanation] = (),
+    findings: Sequence[dict[str, Any]] = (),
 ) -> Iterator[str]:
-    """Yield the lines to print of a proof; explanations are part of it as JSON, and else printed by themselves."""
+    """Yield the lines to print of a proof; findings are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
-        yield json.dumps(_as_json(proof, systems, sources, explanations), indent=2)
+        yield json.dumps(_as_json(proof, systems, sources, findings), indent=2)
         return
     yield summary(proof).line(strict=asked.strict)
     for level_proof in proof.levels:
@@ -390,7 +391,7 @@ def _explanations(
                 text = frozen(explanation.finding, systems, path, case, asked.variants)
                 write_atomically(case, text.encode())
             if not asked.as_json:
-                say_explanation(systems, explanation, settings.most, settings.further)
+                say_explanation(systems, explanation, settings)
     except OSError as error:
         place = str(error.filename or asked.logs)
         raise UnwritableError(place, error.strerror or "no reason given") from error
@@ -431,13 +432,13 @@ def _as_json(
     proof: SystemProof,
     systems: dict[str, TransitionSystem],
     sources: Sources,
-    explanations: Sequence[Explanation],
+    findings: Sequence[dict[str, Any]],
 ) -> dict[str, Any]:
     return {
         "proved": proof.proved,
         "whole": proof.whole,
         "counts": asdict(summary(proof)),
-        "findings": [explanation_as_json(systems, explanation) for explanation in explanations],
+        "findings": list(findings),
         "notices": [diagnostic_to_json(notice, sources) for notice in notices(systems, proof)],
         "levels": [
             {
