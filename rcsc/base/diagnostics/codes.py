@@ -1809,14 +1809,15 @@ class Code(StrEnum):
     that should hold in each cycle could not be proved: an assumption of a table, that one line matches, or what a neighbour relies on.
     Where a run from the first cycle shows it, the shortest is printed, cycle by cycle, as the interpreter ran it: repair the table. Where
     none is found, it is said which runs were looked at: a longer one may break it, or no invariant that rcsc looks for says why it holds.
-    Then two cycles are shown at which the proof stops, from a state that nobody has seen reached: they tell which line and which values to
-    look at. The helps say what to type: `--trace N` looks at longer runs, `--where "variable = value"` plays on from that state, and if
-    it cannot be, an `invariant` that says so is proved and used. In a run, cycles that are alike take one row. *then* says what follows, each with its run: what the superior takes, up to `--follow N` cycles later. A *help* was tried
-    in short runs, and says what else it breaks; that no run shows more is no proof: prove the changed table. A table's assumption that is
-    not proved stays monitored. What *rests on* it is found so only if it holds; what is *not looked at* could not be stated, and is never
-    proved: the manual has every verdict under "What a verdict says". `--log DIR` keeps each trace as a log for `rcsc replay`, `--freeze
-    DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a warning, as long as nothing that was looked at has changed:
-    the tables by themselves may well be proved.
+    Then two cycles are shown at which the proof stops, from a state that nobody has seen reached: they tell which line and which values
+    to look at. The helps say what to type: `--trace N` looks at longer runs, `--where "variable = value"` plays on from that state, and
+    if it cannot be, an `invariant` that says so is proved and used. In a run, cycles that are alike take one row. *then* says what
+    follows, each with its run: what the superior takes, up to `--follow N` cycles later. A *help* was tried in short runs, and says what
+    else it breaks; that no run shows more is no proof: prove the changed table. A table's assumption that is not proved stays monitored.
+    What *rests on* it is found so only if it holds; what is *not looked at* could not be stated, and is never proved: the manual has
+    every verdict under "What a verdict says". `--log DIR` keeps each trace as a log for `rcsc replay`, `--freeze DIR` as a case that
+    `--case FILE` runs again. `rcsc check` repeats it as a warning, as long as nothing that was looked at has changed: the tables by
+    themselves may well be proved.
     """
     NOT_AGREED = """RCS752: a level assumes more than its neighbour keeps
 
@@ -1838,12 +1839,12 @@ class Code(StrEnum):
     """
     ENDLESS = """RCS756: a command is not shown to end
 
-    Every command is to end if every order that is not replaced is answered. For this table that is not shown: the lines named may run
-    for ever, or a loop of states may never answer it. The run, where there is one, ends as it was before the cycle named, with every
-    order answered or followed by another, so that it may go on for ever; the loop is told by its lines and the states in which they run.
-    Where no run comes to one, a loop from a state that the proof does not exclude is shown. It is a warning: a line may wait for what nobody in the system
-    brings about, and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a number
-    that rises with the line, and that no other line sets back, shows that it ends.
+    Every command is to end if every order that is not replaced is answered. For this table that is not shown: the lines named may run for
+    ever, or a loop of states may never answer it. The run, where there is one, ends as it was before the cycle named, with every order
+    answered or followed by another, so that it may go on for ever; the loop is told by its lines and the states in which they run. Where
+    no run comes to one, a loop from a state that the proof does not exclude is shown. It is a warning: a line may wait for what nobody in
+    the system brings about, and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a
+    number that rises with the line, and that no other line sets back, shows that it ends.
     """
     BAD_START = """RCS757: runs cannot begin so
 
