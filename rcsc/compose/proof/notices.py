@@ -66,7 +66,7 @@ def _never_reached(ts: TransitionSystem, whole: SystemProof, never: NeverReached
         _name(line),
         related=tuple(_cells(line, never)) if isinstance(line, Line) else (),
         notes=tuple(notes),
-        help=("have a line lead there, or leave it out",),
+        help=("have a line lead there, or leave it out; one that is there in case of a fault may stay",),
         severity=Severity.WARNING,
     )
 
