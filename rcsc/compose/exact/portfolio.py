@@ -24,7 +24,7 @@ from rcsc.compose.invariant.search import FoundInvariant
 from rcsc.proof.solvers.horn import UnreadableError
 from rcsc.proof.solvers.smt import Answer
 
-STATED = frozenset({Sort.INVARIANT, Sort.PROPERTY})
+STATED = frozenset({Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT})
 """Obligations that people state to help a proof."""
 CYCLES = 8
 """Cycles of the runs that are looked at before anything is proved."""
