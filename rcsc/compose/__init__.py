@@ -7,15 +7,14 @@ What is proved of each level, alone in its environment (`proof.level`):
   in a cycle each owes this at its place, on what those before it left;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
 - no new command is passed over by a line that does not look for one; a PAUSE is passed on in the cycle that takes it;
-- its program's invariants, and its properties over a cycle and the one before (`properties`);
+- its program's invariants, its properties over a cycle and the one before (`properties`), its requirements over time;
 - its guarantees for neighbours: its report echoes the number and the command of the order that it took in that
   very cycle (so no order is lost, and none is echoed that was not run); its orders change only together with their
   numbers, and numbers come one after the other;
 - of a level by hand, that *done* and *failed* stay (others state it as properties): no proof of a neighbour takes it for granted.
 
-Context: which lines are never reached, and what a line does when it matches again (`proof.context`); which states nothing leaves
-(`proof.stuck`). Termination: every command is eventually answered, assuming that subordinates answer theirs (`proof.termination`,
-`proof.ranking`).
+Context: lines that are never reached, what a line does when it matches again (`proof.context`), states that nothing leaves
+(`proof.stuck`). Termination: every command is answered if subordinates answer theirs (`proof.termination`, `proof.ranking`).
 
 What a level assumes of its environment is the contract (`transition`):
 

@@ -88,6 +88,7 @@ state seen : int 0 .. 9
 output z : bool
 invariant little : seen <= 4
 property shown : z implies o <= 3
+requirement few : whenever z, at once o <= 3
 assume small assumed monitored : o <= 4
 table t assuming small {
   | line | o                   || seen | z     |
@@ -102,7 +103,7 @@ level r { period 40 [ms] table t }
     '[buffers]\n"out.x" = "w.x"\n"w.o" = "r.o"\n' + WITHIN,
 }
 """One level reads what another writes, and rests on it."""
-OF_THE_PAIR = {"OWED", "GIVEN", "ASSUMPTION", "NO_DEFAULT", "PROPERTY"}
+OF_THE_PAIR = {"OWED", "GIVEN", "ASSUMPTION", "NO_DEFAULT", "PROPERTY", "REQUIREMENT"}
 """Kinds of claims that a number too high by one makes false."""
 SLIPS_OF_CODE = [
     ("w.py", "s.o = s.x", "s.o = s.x + 20", "SAFE"),

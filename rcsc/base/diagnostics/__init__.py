@@ -17,6 +17,7 @@ Nothing here is trusted for a verdict. What comes from a user's file is made saf
 before it is shown.
 
 Modules, in the order the data flows: `source` (named texts and spans), `codes` (what each code means, with its
-example), `coded` (errors that know their code), `diagnostic`, `report` (what a command found and what backs it); then the
-forms of a report: `render` (text; `printable` makes user text safe), `jsonform`, `services` (SARIF, GitHub).
+example), `coded` (errors that know their code), `diagnostic`, `report` (what a command found and what backs it),
+`alike` (rows that are folded into one); then the forms of a report: `render` (text; `printable` makes user text
+safe), `jsonform`, `services` (SARIF, GitHub).
 """

@@ -17,7 +17,8 @@ Cost: linear in the number of levels, which are proved one by one; termination a
 A proof is kept under a digest of all that it depends on, and only read the next time. After a change the clauses of the last search are
 the first that the next one tries.
 
-Modules, in the order the data flows: `context` (lines), `staying` (the cycles of one table), `ranking` (what stops), `termination`
-(commands), `candidates` (clauses of the last search), `level` (all of one level), `assume_guarantee` (promises, claims),
-`standing` (what the cache has of a system), `system`.
+Modules, in the order the data flows: `stuck` (lines that are never reached, states that nothing leaves), `context` (lines),
+`staying` (the cycles of one table), `ranking` (what stops), `termination` (commands), `candidates` (clauses of the last search),
+`level` (all of one level), `assume_guarantee` (promises, claims), `standing` (what the cache has of a system), `system`, `notices`
+(warnings of what `context` found).
 """

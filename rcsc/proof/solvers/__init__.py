@@ -16,6 +16,6 @@ Trusted: Z3, wherever a verdict says that Z3 settled it. cvc5 is asked in text a
 answers what `rcsc certify` and `--certify` put to it anew. What PySAT says is only ever a hint, which Z3 confirms.
 The processor's time is a backstop: what it ends is undecided, and is not kept for the next run.
 
-Modules: `options` (how a proof is made), `search` (bisection that asks little), `smt` (Z3), `smtlib` (cvc5), `sat`
-(PySAT).
+Modules: `options` (how a proof is made), `search` (bisection that asks little), `smt` (Z3), `horn` (its Spacer), `smtlib` (cvc5),
+`sat` (PySAT).
 """

@@ -105,14 +105,20 @@ COUNTS = (
 def test_an_open_claim_says_what_was_looked_at_where_it_stops_and_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The state by name, and the length of run to ask for, with which the run is found; none of the pairs of ten lines is listed."""
+    """The state by name, and the length of run to ask for, with which the run is found; none of the pairs of ten lines is listed.
+
+    Without `--where` all states are searched, and the run is found at once.
+    """
     path = solo_system(tmp_path, COUNTS)
     assert run(["prove", str(path), "--no-cache"]) == 1
+    assert "broken in cycle 21" in capsys.readouterr().err
+    begins = ("--where", "solo.now = 0")
+    assert run(["prove", str(path), "--no-cache", *begins]) == 1
     said = capsys.readouterr().err
     [_, calm, one_line] = said.split("error[RCS751]: ")
     assert calm.startswith("level `solo`, table `ten`: not proved: assumption `calm`\n")
     assert (
-        "no run of 8 cycles or fewer breaks it: all of them were looked at, from the first values, and after a restart"
+        "no run of 8 cycles or fewer breaks it: all of them were looked at, from the values of --where"
         in calm
     )
     assert "whether that is ever reached is not known: `now` = 0, `ticks` = 19" in calm
@@ -123,7 +129,7 @@ def test_an_open_claim_says_what_was_looked_at_where_it_stops_and_what_to_do(
     assert one_line.count(" and late") == 1, (
         "the state at which it stops shows one pair, and no other is listed"
     )
-    assert run(["prove", str(path), "--no-cache", "--trace", "27"]) == 1
+    assert run(["prove", str(path), "--no-cache", *begins, "--trace", "27"]) == 1
     assert "broken in cycle 21" in capsys.readouterr().err
 
 
