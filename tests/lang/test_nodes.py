@@ -10,16 +10,20 @@ import z3
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.lang.interpret import evaluate
 from rcsc.lang.model import (
     Among,
+    Apply,
     Bool,
     Enum,
     Int,
     Kind,
+    Literal,
     Read,
     Real,
     Scalar,
     Single,
+    Value,
     Variable,
     VariableName,
 )
@@ -30,7 +34,7 @@ from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import trial, values
-from rcsc.proof.symbolic.encode import declared, encode
+from rcsc.proof.symbolic.encode import Frame, declared, encode
 from rcsc.proof.symbolic.keyed import KEY
 from rcsc.proof.symbolic.measured import Measured
 from rcsc.proof.symbolic.values import FALSE, TRUE, Fact, Node
@@ -396,3 +400,63 @@ def test_a_double_that_is_divided_is_followed_as_far_as_it_is_rounded() -> None:
     near = [smt.at_most(smt.fraction(end), quarter, KEY) for end in (0.2499, 0.2501)]
     assert solver.check(near[0], smt.negation(near[1])) is Answer.SATISFIABLE
     assert solver.check(smt.negation(near[0])) is solver.check(near[1]) is Answer.UNSATISFIABLE
+
+
+@pytest.mark.parametrize(
+    ("op", "kind", "operands", "made"),
+    [
+        (Op.ABS, Int(-9, 9), (-4,), Int(0, 9)),
+        (Op.TO_INT, Bool(), (True,), Int(0, 1)),
+        (Op.TO_INT, Bool(), (False,), Int(0, 1)),
+        (Op.TO_REAL, Int(-9, 9), (-4,), Real(-9.0, 9.0)),
+        (Op.TO_REAL, Single(-9.0, 9.0), (to_single(0.1),), Real(-9.0, 9.0)),
+        (Op.TO_SINGLE, Real(-9.0, 9.0), (0.1,), Single(-9.0, 9.0)),
+        (Op.SUB, Real(-9.0, 9.0), (0.3, 0.1), Real(-18.0, 18.0)),
+    ],
+)
+def test_z3_computes_what_the_interpreter_does(
+    op: Op, kind: Scalar, operands: tuple[Value, ...], made: Scalar
+) -> None:
+    """Of each operator one value, and which it is; all edges are tried in `test_operators`."""
+    expr = Apply(op, tuple(Literal(value, kind) for value in operands), made)
+    solver = Solver()
+    same = smt.equal(encode(expr, Frame({})), smt.literal(made, evaluate(expr, {})), made)
+    assert solver.check(smt.negation(same)) is Answer.UNSATISFIABLE
+
+
+def test_a_constant_that_nothing_bounds_has_some_value_in_a_model() -> None:
+    solver = Solver()
+    assert solver.check() is Answer.SATISFIABLE
+    assert isinstance(solver.value(smt.variable("n", KEY), KEY), int)
+
+
+def test_what_z3_has_of_a_question_that_was_broken_off_is_not_asked_again() -> None:
+    """It may end the process, or take for ever to be rid of it."""
+    solver = Solver(Limits(steps=1))
+    one, other = smt.variable("p", KEY), smt.variable("q", KEY)
+    product_ = smt.integer_operation("*", one, other)
+    solver.add(smt.equal(product_, smt.literal(KEY, 391), KEY), smt.below(one, other, KEY))
+    before = solver._solver
+    assert solver.check() is Answer.UNKNOWN
+    solver.begins_anew(1_000_000, 0)
+    solver.check()
+    assert solver._solver is not before
+
+
+def test_a_single_of_a_double_is_followed_as_far_as_it_is_rounded() -> None:
+    measured = Measured()
+    rounded = measured.term(values.arithmetic(Op.TO_SINGLE, (Y,), Single(0.5, 4.0)))
+    solver = Solver()
+    solver.add(*measured.ranges, smt.equal(measured.term(Y), smt.fraction(1.1), KEY))
+    near = [smt.at_most(smt.fraction(end), rounded, KEY) for end in (1.0999, 1.1001)]
+    assert solver.check(near[0], smt.negation(near[1])) is Answer.SATISFIABLE
+    assert solver.check(smt.negation(near[0])) is solver.check(near[1]) is Answer.UNSATISFIABLE
+
+
+def test_nodes_that_are_built_alike_have_one_number_and_those_of_other_parts_another() -> None:
+    """What nobody computes is any value: one for two products would make them equal."""
+    alike, wide = values.Alike(), Int(-99, 99)
+    one, again, other = (
+        values.arithmetic(Op.MUL, parts, wide) for parts in ((N, M), (N, M), (N, number("k", 0, 5)))
+    )
+    assert alike.number(one) == alike.number(again) != alike.number(other)

@@ -547,6 +547,20 @@ def test_boxes_of_many_intervals_meet_in_few_steps() -> None:
         assert meet(many, many) == many
 
 
+def test_a_dead_line_meets_none_and_hides_no_other() -> None:
+    axes = {"x": (0, 9), "y": (0, 9)}
+    lines: list[Mapping[str, Box]] = [{"x": ()}, {"x": ((0, 4),)}, {"y": ((3, 9),)}]
+    assert list(partition.Boxes(axes, lines).overlaps()) == [(1, 2)]
+
+
+def test_the_region_of_an_overlap_names_no_variable_that_may_be_anything() -> None:
+    text = HEAD + table_text("t", "line | n | a ||", "l | -1 .. 3 | true ||", "m | -1 .. 3 | true ||")
+    program = program_of(text)
+    findings = prove_table(program, program.tables[0], BOXES).findings
+    [found] = [each for each in findings if isinstance(each, Overlap)]
+    assert found.region == {"a": ((1, 1),)}
+
+
 @given(st.lists(INTERVALS.map(tuple), min_size=1, max_size=4), INTERVALS)
 def test_slices_say_which_lines_hold_and_meet(stated: list[Box], asked: list[tuple[int, int]]) -> None:
     """Whatever intervals a box is written in."""

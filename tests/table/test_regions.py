@@ -69,7 +69,7 @@ from rcsc.proof.table.regions.region import (
     Split,
 )
 from rcsc.proof.table.regions.splitting import Tree
-from rcsc.proof.table.verdict import DeadLine, Gap, Overlap, Undecided
+from rcsc.proof.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 from tests.bench.made import families
 from tests.support.programs.stages import BOXES, verdict_of
 from tests.support.programs.stages import program_of as compiled
@@ -590,6 +590,110 @@ def test_inputs_of_a_region_that_one_line_matches_show_nothing_wrong() -> None:
     assert (decision.by_solver, tried.by_solver) == (True, False)
 
 
+HYPERBOLA = (
+    "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n"
+    "| a | x * y < 7 ||\n| b | (x + 1) * y >= 7 + y ||\n}\n"
+)
+"""Right, which takes the solver: the terms of the two lines are two."""
+
+
+def deciding(text: str) -> relational._Decision:
+    program = compiled(text)
+    return relational._Decision(program, program.tables[0], BOXES)
+
+
+def test_a_search_that_is_to_go_without_the_solver_asks_it_nothing() -> None:
+    for how in ({"alone": True}, {"covering": True}):
+        decision = deciding(HYPERBOLA)
+        assert decision.search((), **how).undecided
+        assert not decision.by_solver
+
+
+def test_a_table_of_products_has_a_certificate_of_its_own_that_rests_on_the_solver() -> None:
+    program = compiled(HYPERBOLA)
+    assert relational.certificate_alone(program, program.tables[0], BOXES) is not None
+
+
+def test_what_few_steps_leave_open_is_decided_with_all_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(relational, "WRONG_STEPS", 2)
+    monkeypatch.setattr(relational._Decision, "refuted_by_trial", property(lambda _: False))
+    program = compiled(HYPERBOLA)
+    assert relational._Decision(program, program.tables[0], BOXES, few=True).decided().findings
+    decided = relational.decide(program, program.tables[0], BOXES)
+    assert (decided.findings, decided.by_solver) == ((), True)
+
+
+def test_the_proof_rests_on_the_assumptions_that_it_needs_alone() -> None:
+    """Each is tried to be spared by a search of more than one region."""
+    program = compiled(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\nassume no assumed : x + y /= 7\nassume idle assumed : x + y < 9\n"
+        "table t assuming no, idle {\n| line | when ||\n| a | x + y < 7 ||\n| b | x + y > 7 ||\n}\n"
+    )
+    decided = relational.decide(program, program.tables[0], BOXES)
+    assert (decided.findings, decided.used) == ((), (AssumptionName("no"),))
+
+
+def test_an_input_that_is_known_is_not_told_where_a_lesser_one_is_found() -> None:
+    decision = deciding(HYPERBOLA)
+    assert decision.witness([{"x": 9, "y": 9}], lambda z3: (z3.line(1),)) == {"x": 1, "y": 7}
+
+
+def test_two_lines_that_an_input_is_known_to_match_need_no_solver() -> None:
+    decision = deciding(HYPERBOLA.replace("< 7", "< 8"))
+    decision._tried = (({"x": 1, "y": 7}, frozenset((0, 1))),)
+    assert decision.oracle(Question((), (0, 1))) == {"x": 1, "y": 7}
+    assert not decision.by_solver
+
+
+def test_an_input_that_is_known_is_a_gap_in_a_region_that_was_given_up() -> None:
+    decision = deciding(HYPERBOLA.replace(">= 7", "> 7"))
+    decision._tried = (({"x": 7, "y": 1}, frozenset()),)
+    [found] = decision.gap(Search(undecided=1))
+    assert found.finding == Gap(({"x": 1, "y": 7},), (None,))
+
+
+def test_an_input_that_shows_no_further_pair_ends_the_search_for_these(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Z3 may say that two lines meet, and give an input at which the interpreter does not see it."""
+    decision = deciding(HYPERBOLA.replace(">= 7", ">= 6"))
+    monkeypatch.setattr(TableSolver, "model", lambda _: {"x": 0, "y": 0})
+    assert decision.others(Question((), (0, 1)), frozenset()) == set()
+
+
+@pytest.mark.parametrize(("needed", "only"), [("x * y < 20", True), ("x * x < 20", False)])
+def test_a_line_is_told_apart_that_only_an_assumption_excludes_though_it_is_not_linear(
+    needed: str, only: bool
+) -> None:
+    decision = deciding(
+        f"input x : int 0 .. 9\ninput y : int 0 .. 9\nassume small assumed : {needed}\n"
+        "table t assuming small {\n| line | when ||\n"
+        f"| a | x * y < 20 ||\n| b | x * y {'>= 20' if only else '>= 100'} ||\n}}\n"
+    )
+    assert decision.dead() == [DeadLine(1, only)]
+
+
+def test_a_region_reaches_below_its_input_where_an_assumption_allows_that() -> None:
+    decision = deciding(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\nassume some assumed : x + y >= 5\n"
+        "table t assuming some {\n| line | when ||\n| a | x + y >= 5 ||\n| b | x + y >= 4 ||\n}\n"
+    )
+    [found] = [each for each in decision.decided().findings if isinstance(each, Overlap)]
+    assert (found.witness, found.region) == ({"x": 0, "y": 5}, {})
+
+
+@pytest.mark.parametrize(
+    ("more", "asked"), [("x + y < 1 and x > 3", False), ("x * y = 7 and (x + 1) * y = 9 + y", True)]
+)
+def test_of_a_contradiction_it_is_told_whether_the_solver_was_asked(more: str, asked: bool) -> None:
+    decision = deciding(
+        f"input x : int 0 .. 9\ninput y : int 0 .. 9\nassume no assumed : {more}\n"
+        "table t assuming no {\n| line | when ||\n| a | x < 4 ||\n| b | x >= 4 ||\n}\n"
+    )
+    decided = decision.decided()
+    assert (decided.findings, decided.by_solver) == ((ContradictoryAssumptions(),), asked)
+
+
 def test_what_is_not_looked_for_any_more_is_not_told_of() -> None:
     program = compiled(
         "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
@@ -601,15 +705,22 @@ def test_what_is_not_looked_for_any_more_is_not_told_of() -> None:
     assert decision.dead() == [DeadLine(2, False)]
 
 
-@pytest.mark.parametrize("asked", [0, splitting.MOST_PAST])
+@pytest.mark.parametrize("asked", [0, 2, splitting.MOST_PAST])
 def test_past_the_budget_nothing_is_proved(asked: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each region that is left it is said so, whether the solver is asked about some or not."""
     monkeypatch.setattr(splitting, "MOST_PAST", asked)
     program = program_of(orders(5))
     universe = Universe()
     lines = lines_of(universe, program.tables[0])
-    search = Tree(universe, lines, (), lambda _: NoWitness.UNKNOWN, default=False, budget=50).run()
+    questions = []
+
+    def oracle(question: Question) -> NoWitness:
+        questions.append(question)
+        return NoWitness.UNKNOWN
+
+    search = Tree(universe, lines, (), oracle, default=False, budget=50).run()
     assert search.undecided == search.nodes.count(Open()) > 3
+    assert len(questions) == min(asked, splitting._PATIENCE)
     assert not search.proved
 
 
@@ -695,6 +806,16 @@ def test_the_least_point_and_the_least_value_of_each_form_are_those_of_brute_for
             below = simplex.copy()
             below.restrict(form, below.low[form], math.ceil(least_value) - 1)
             assert below.low[form] > below.high[form] or below.refute() is not None
+
+
+def test_a_copy_of_what_was_refuted_is_refuted_for_the_same_reason() -> None:
+    simplex = Simplex()
+    for column in (0, 1):
+        simplex.add_column(column, 0, 9)
+    simplex.add_form(2, ((0, 1), (1, 1)), 30, 40)
+    why = simplex.refute()
+    assert why is not None
+    assert simplex.copy().refute() == why
 
 
 def test_looking_for_a_point_of_integers_has_an_end() -> None:
