@@ -656,6 +656,14 @@ def test_an_extern_procedure_is_taken_to_answer_the_same_to_the_same() -> None:
 
 
 @pytest.mark.parametrize("back", [False, True])
+def test_an_extern_procedure_that_takes_more_is_called_otherwise(back: bool) -> None:
+    more = edited(EXTERN, ("ask reads", "ask(k : int 0 .. 9) reads"), ("; ask }", "; ask(1) }"))
+    found = differ(more, EXTERN) if back else differ(EXTERN, more)
+    [change] = part(found, "grip").changes
+    assert "extern calls" in [v.leaf for v in change.values]
+
+
+@pytest.mark.parametrize("back", [False, True])
 def test_what_is_written_before_an_extern_call_is_seen_since_the_cycle_may_end_there(back: bool) -> None:
     """Whichever of the versions writes it."""
     before, after = EXTERN, edited(EXTERN, ("seen := true; ask", "ask; seen := true"))

@@ -30,7 +30,7 @@ class ExternCall:
     """A call of an extern procedure: the cycle may end there, so that what was written before is seen.
 
     Attributes:
-        spelled: Name and implementation, and the leaves that it reads and writes.
+        spelled: Name, number of arguments and implementation, and the leaves that it reads and writes.
         path: When the call is reached.
         given: What it is called with.
         before: The leaves written so far.
@@ -137,7 +137,7 @@ class _Followed(Run):
         """Run a call; the results of the n-th extern call have the same names in every run."""
         if procedure.extern is not None:
             given = (*(self.leaf(name) for name in procedure.reads), *(value for _, value in args))
-            spelled = f"{procedure.name} {procedure.extern} {procedure.reads} {procedure.writes}"
+            spelled = f"{procedure.name} {len(args)} {procedure.extern} {procedure.reads} {procedure.writes}"
             self.calls.append(ExternCall(spelled, self.path, given, dict(self.state.leaves)))
         Run.call(self, procedure, args)
 
