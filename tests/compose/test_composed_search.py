@@ -10,6 +10,7 @@ from functools import partial
 from itertools import islice, product
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -23,11 +24,12 @@ from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.predicates import Predicate
-from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.transition import Cycle, Safety, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, Valuation, Way, Ways, shown
 from rcsc.compose.invariant.search import Effort, FoundInvariant, search
 from rcsc.compose.proof import context as context_
 from rcsc.compose.proof import level as level_proof
+from rcsc.compose.proof import system
 from rcsc.compose.proof.candidates import Candidates, candidates, keep_candidates
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
@@ -42,7 +44,7 @@ from rcsc.compose.proof.system import (
 )
 from rcsc.compose.proof.termination import Phase, longest
 from rcsc.front.commands import run
-from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
+from rcsc.lang.model import AssumptionName, Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Limits
@@ -54,6 +56,7 @@ from rcsc.proof.symbolic.encode import at_most_key
 from rcsc.proof.symbolic.keyed import Keyed
 from rcsc.proof.symbolic.trial import holds_at
 from rcsc.proof.symbolic.values import Node
+from tests.support.programs.stages import program_of
 from tests.support.programs.systems import (
     LITTLE,
     ORDER_AFTER_ORDER,
@@ -934,3 +937,89 @@ def test_simpler_clauses_say_the_same_of_what_is_read(seed: int) -> None:
             assert not whole.holds(simpler.core())
     for sat in (whole, simpler):
         sat.close()
+
+
+@pytest.mark.parametrize(("before", "times"), [(("ending t",), 1), ((), 2)])
+def test_where_more_is_missing_than_before_all_is_proved_once_more_without_old_clauses(
+    before: tuple[str, ...], times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun = Candidates((((("p", True),),),), "another version", before)  # type: ignore[arg-type]
+    asked: list[Candidates] = []
+
+    def proved(
+        _ts: object, _effort: object, _cache: object, _walked: object, known: Candidates
+    ) -> LevelProof:
+        asked.append(known)
+        return LevelProof("l", (), (), (), 0, 0, float(len(asked)))
+
+    monkeypatch.setattr(level_proof, "content", lambda _: "this version")
+    monkeypatch.setattr(level_proof, "candidates", lambda *_: begun)
+    monkeypatch.setattr(level_proof, "keep_candidates", lambda *_: None)
+    monkeypatch.setattr(level_proof, "_lacking", lambda _: ("ending t",))
+    monkeypatch.setattr(level_proof, "_proved", proved)
+    nothing: Any = None
+    assert level_proof._proved_of(nothing, Effort(), None, FoundInvariant()).seconds == times
+    assert asked == [begun, Candidates(found_of="this version")][:times]
+
+
+@pytest.mark.parametrize("gone", [0, 1])
+def test_a_kept_proof_of_which_a_part_is_of_another_version_is_none(
+    gone: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts_ = [LevelProof("l", (), (), (), 0, 0, 0.0) if at != gone else None for at in range(2)]
+    left = iter(parts_)
+    monkeypatch.setattr(system, "_recalled", lambda *_: next(left))
+    ts: Any = SimpleNamespace(refusing=lambda: None)
+    kept: Any = SimpleNamespace(parts=(None, None))
+    assert system._whole(ts, kept) is None
+
+
+def test_the_questions_of_a_proof_in_two_parts_are_those_of_both_within_the_same_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+
+    def questions(_: object, proof: LevelProof, limits: Limits) -> dict[str, str]:
+        asked.append((proof.seconds, limits))
+        return {"first": f"of part {proof.seconds}"}
+
+    monkeypatch.setattr(level_proof, "_certificate", questions)
+    parts_ = tuple(LevelProof("l", (), (), (), 0, 0, float(at)) for at in (1, 2))
+    ts: Any = SimpleNamespace(refusing=lambda: None)
+    found = level_proof.certificate(ts, replace(parts_[1], parts=parts_), Limits(steps=5))
+    assert found == {"first": "of part 1.0", "nothing refused first": "of part 2.0"}
+    assert asked == [(1.0, Limits(steps=5)), (2.0, Limits(steps=5))]
+
+
+def test_whether_a_cycle_can_follow_is_asked_of_where_the_one_before_begins(tmp_path: Path) -> None:
+    """A later one begins in the invariant, which here holds nowhere; a first one does not."""
+    ts = small_level(tmp_path, "lower")
+    cycle, never = ts.cycle(ts.havoc()), Solver()
+    never.add(smt.truth(False))
+    inference: Any = SimpleNamespace(
+        cycle=cycle, keyed=Keyed(), known=lambda _: never, beginning=lambda _: Solver()
+    )
+    assert level_proof._followed(ts, inference, (), cycle) is Answer.UNSATISFIABLE
+    assert level_proof._followed(ts, inference, (), ts.cycle(ts.havoc(), " first")) is Answer.SATISFIABLE
+
+
+def test_what_a_line_changes_when_it_matches_again_is_found_without_a_proof(tmp_path: Path) -> None:
+    upper = small_text(
+        "upper",
+        (COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9"),
+        ("procedure begin {", "procedure again { tries := min(tries + 1, 9) }\n\nprocedure begin {"),
+        ("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go "),
+    )
+    ts = small_level(tmp_path, "upper", upper=upper)
+    asked = level_proof._asked_anew((), tuple(ts.firsts().values()), ts.cycle(ts.havoc()), Limits())
+    [later, *_] = context_._starts(ts, asked, ())
+    assert "tries" in dict(context_._repeated(ts, asked, later))["work", "1"]
+
+
+def test_safety_needs_no_invariant_where_it_rests_on_the_same_assumption_with_and_without() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nstate m : int 0 .. 9\ninvariant low : m <= 9\nassume small assumed : a < 9\n"
+        "table t assuming small {\n| line | a || n |\n| l | 0 .. 9 || a + 1 |\n}\n"
+    )
+    assert system._safety(program, {"t": (AssumptionName("small"),)}, ()) == Safety()
+    assert system._safety(program, {}, ()) == Safety(("low",))

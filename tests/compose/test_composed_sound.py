@@ -8,19 +8,30 @@ from random import Random
 
 import pytest
 
-from rcsc.compose.contract.claims import ACCEPTED, CONTRACT, ENDING, RUNS, SAFE, Claim, Key, Need, closed
-from rcsc.compose.contract.environment import links
-from rcsc.compose.contract.obligations import Sort, unstated
+from rcsc.compose.contract.claims import (
+    ACCEPTED,
+    AGAIN,
+    CONTRACT,
+    ENDING,
+    RUNS,
+    SAFE,
+    Claim,
+    Key,
+    Need,
+    closed,
+)
+from rcsc.compose.contract.environment import Asked, links
+from rcsc.compose.contract.obligations import Obligation, Sort, unstated
 from rcsc.compose.contract.properties import invariant_kept, property_kept
-from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.transition import GHOST, TransitionSystem
 from rcsc.compose.counterexample.cycle_run import one_cycle, ran_on
 from rcsc.compose.counterexample.explain import TraceSettings, explain
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import TraceSearch
-from rcsc.compose.proof.assume_guarantee import agreements, of_level
-from rcsc.compose.proof.context import of_lines
+from rcsc.compose.proof.assume_guarantee import admitted, agreements, of_level
+from rcsc.compose.proof.context import Context, of_lines
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, loaded_program, transition_systems
 from rcsc.compose.proof.termination import Ending
@@ -383,6 +394,42 @@ def test_no_answer_of_the_database_is_a_key_of_a_question(
             transition_systems(path)
     else:
         assert [one.into for one in transition_systems(path)["solo"].links.asked] == ["first", "second"]
+
+
+def test_the_same_question_to_the_database_has_the_same_answer(tmp_path: Path) -> None:
+    """Once it was asked, as long as its key stays."""
+    text = (
+        "enum which { a, b }\ninput key : which\ninput found : which\nstate y : bool\n"
+        "table t {\n  | line | found || y |\n  |---|---||---|\n  | 1 | a || true |\n  | 2 | b || false |\n}\n"
+        "level solo { period 40 [ms] table t }\n"
+    )
+    ts = transition_systems(solo_system(tmp_path, text))["solo"]
+    ts = replace(ts, links=replace(ts.links, asked=(Asked("found", ("found",), ("key",)),)))
+    cycle, terms, solver = ts.cycle(ts.havoc()), Keyed(), Solver()
+    asked, same = cycle.before[f"{GHOST}found"], cycle.before[f"{GHOST}found key"]
+    other = values.negation(values.equal(cycle.before["found"], cycle.taken["found"]))
+    again = values.equal(same, cycle.taken["key"])
+    parts = [terms.term(part) for part in (cycle.contract, other, again, asked)]
+    solver.add(*terms.ranges)
+    assert solver.check(*map(solver.switch, parts)) is Answer.UNSATISFIABLE
+    assert solver.check(*map(solver.switch, [*parts[:2], parts[3]])) is Answer.SATISFIABLE
+    assert solver.check(*map(solver.switch, parts[:3])) is Answer.SATISFIABLE
+    assert ts.initial()[f"{GHOST}found"] is not values.TRUE
+
+
+def test_what_is_shown_only_as_if_nothing_were_refused_trusts_that(tmp_path: Path) -> None:
+    ts = small_level(tmp_path, "lower")
+    ts.refusable = ("there",)
+    safe = Obligation(Sort.SAFE, "", "", values.TRUE)
+    shown, open_ = (
+        LevelProof("lower", ((safe, verdict),), (), (), 0, 0, 0.0, context=Context((), (), restless=False))
+        for verdict in (Verdict.PROVED, Verdict.NOT_PROVED)
+    )
+    for proof, trusts in ((shown, ()), (replace(shown, parts=(open_, shown)), admitted(ts))):
+        claims = dict(of_level(ts, proof))
+        assert claims[SAFE].trusts == trusts
+        assert claims[AGAIN, "", ""].verdict is Verdict.PROVED
+    assert admitted(ts) == ("`there` of level `lower` is never refused",)
 
 
 # --- how levels begin ----------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from rcsc.compose.proof.ranking import RisingLine, fewest, inputs, least_power, 
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.front.commands import run
-from rcsc.lang.model import Int, Op, Real
+from rcsc.lang.model import Bool, Int, Op, Real
 from rcsc.lang.operator_table import Arithmetic
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.smt import Answer, Solver
@@ -380,6 +380,45 @@ def test_the_steps_of_a_table_are_read_line_by_line(tmp_path: Path, monkeypatch:
     _, proof = proved_level(tmp_path, "lower", lower=lower_level(*TURNS, **TICK))
     assert proof.open == ()
     assert counts["allowed"] > 0
+
+
+@pytest.fixture
+def lines_of_two_numbers() -> ranking._Ranking:
+    """One line that follows itself, in a cycle that moves `a` and `b` by 1 and -2, or by -2 and 1: only their sum goes one way."""
+    made, kind = ranking._Ranking.__new__(ranking._Ranking), Int(-99, 99)
+    made.solver = Solver()
+    terms = {name: smt.variable(name, kind) for name in ("a", "b", "a'", "b'")}
+    made.numbers = [ranking.KeptNumber(name, kind, terms[name], terms[f"{name}'"]) for name in ("a", "b")]
+    moves = [
+        smt.all_of(
+            [
+                smt.equal(each.after, smt.integer_operation("+", each.before, smt.literal(kind, by)), kind)
+                for each, by in zip(made.numbers, step, strict=True)
+            ]
+        )
+        for step in ((1, -2), (-2, 1))
+    ]
+    made.solver.add(smt.any_of(moves))
+    made.moves, made.counted = [], []
+    made.last = made.now = made.next = [smt.variable("runs", Bool())]
+    made.always = {(0, 0)}
+    made.turn = SimpleNamespace(at=SimpleNamespace(lines=[(SimpleNamespace(name="l"), None)]))  # type: ignore[assignment]
+    return made
+
+
+def test_a_sum_of_two_numbers_that_falls_stops_a_line(lines_of_two_numbers: ranking._Ranking) -> None:
+    found = lines_of_two_numbers._sum(0, [], [])
+    assert found is not None
+    assert found[0] == RisingLine("l", "a + b", falls=True)
+
+
+@pytest.mark.parametrize("orders", [False, True])
+def test_a_line_without_a_counter_that_orders_may_order_for_ever(
+    orders: bool, lines_of_two_numbers: ranking._Ranking
+) -> None:
+    lines_of_two_numbers.numbers = []
+    lines_of_two_numbers.ordered = {"report": smt.truth(orders)}
+    assert lines_of_two_numbers.orders_for_ever("report") is orders
 
 
 # --- another solver -----------------------------------------------------------------------------

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 import rcsc
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.proof.assume_guarantee import promises
 from rcsc.compose.proof.level import Verdict, prove_level
 from rcsc.compose.proof.system import SystemProof, transition_systems
 from rcsc.front.commands import run
@@ -205,18 +206,35 @@ def test_a_fact_that_no_writer_can_owe_is_trusted_only_where_the_outside_can_kee
     assert ts.trusted == (frozenset({"fact"}) if trusted else frozenset())
 
 
-@pytest.mark.parametrize(("first", "begins"), [("", False), (" = 4", True)])
-def test_a_fact_holds_of_what_the_reader_begins_with(first: str, begins: bool, tmp_path: Path) -> None:
-    """Before anything is published the reader sees its own first value."""
+def wide_system(folder: Path, first: str) -> Path:
+    """A level that owes another one a number from 4, which begins as `first` says."""
     given = "input there : bool", f"input there : bool\ninput wide : int 0 .. 9{first}"
     table = "table go {", "assume fact assumed : wide >= 4\ntable go assuming fact {"
     upper = small_text("upper", ("input lower", "output wide : int 4 .. 9\ninput lower"))
-    path = small_system(tmp_path, upper=upper, lower=small_text("lower", given, table))
+    path = small_system(folder, upper=upper, lower=small_text("lower", given, table))
     path.write_text(f'{path.read_text(encoding="utf-8")}"upper.wide" = "lower.wide"\n', encoding="utf-8")
-    whole = prove_system(path, LITTLE)
+    return path
+
+
+@pytest.mark.parametrize(("first", "begins"), [("", False), (" = 4", True)])
+def test_a_fact_holds_of_what_the_reader_begins_with(first: str, begins: bool, tmp_path: Path) -> None:
+    """Before anything is published the reader sees its own first value."""
+    whole = prove_system(wide_system(tmp_path, first), LITTLE)
     assert whole.of("upper", (Sort.OWED, "", "lower.fact")).verdict is Verdict.PROVED
     assert whole.of("lower", (Sort.ASSUMPTION, "go", "fact")).proved == begins
     assert whole.proved == begins
+
+
+@pytest.mark.parametrize(("first", "begins"), [("", False), (" = 4", True)])
+def test_a_fact_about_one_buffer_is_an_obligation_of_its_writer_and_a_promise_to_its_reader(
+    first: str, begins: bool, tmp_path: Path
+) -> None:
+    systems = transition_systems(wide_system(tmp_path, first))
+    upper = systems["upper"]
+    owed = [each.key for each in obligations(upper, upper.cycle(upper.havoc())) if each.sort is Sort.OWED]
+    assert owed == [(Sort.OWED, "", "lower.fact")]
+    [promise] = [each for each in promises(systems) if each.fact == "fact"]
+    assert (promise.level, promise.begins) == ("lower", begins)
 
 
 def test_a_fact_holds_of_what_stands_in_the_buffer_at_a_restart(tmp_path: Path) -> None:
@@ -405,3 +423,13 @@ def test_a_bool_is_never_refused(tmp_path: Path) -> None:
     path = solo_system(tmp_path, text)
     assert transition_systems(path)["solo"].refusable == ()
     assert prove_system(path, LITTLE).admitting == ()
+
+
+def test_where_nothing_is_refused_nothing_stands_outside_its_range(tmp_path: Path) -> None:
+    text = (
+        "input y : int 0 .. 100 clamp\nstate s : bool\nproperty near : s or y - was y <= 100\n"
+        "table t {\n  | line | y        || s     |\n  |---|---||---|\n  | l    | 0 .. 100 || true  |\n}\nlevel solo { table t }\n"
+    )
+    ts = transition_systems(solo_system(tmp_path, text))["solo"]
+    assert ts.clamped == ("y",)
+    assert ts.admitting().cycle(ts.havoc()).strange == frozenset()

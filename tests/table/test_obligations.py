@@ -147,6 +147,20 @@ def test_each_fault_is_found_at_its_place(statements: str, code: str) -> None:
     assert all(finding.witnesses for finding in found if finding.code is not Code.USE_BEFORE_ASSIGNMENT)
 
 
+@pytest.mark.parametrize(("orelse", "found"), [("k := 2", []), ("m := 2", ["k"])])
+def test_a_local_has_a_value_where_each_branch_gives_it_one(orelse: str, found: list[str]) -> None:
+    statements = f"local k : int 0 .. 9 if yes {{ k := 1 }} else {{ {orelse} }} n := k"
+    told = body(statements)
+    assert [one.code for one in told] == [Code.USE_BEFORE_ASSIGNMENT] * len(found)
+    text = f"{VARIABLES}procedure p {{\n{statements}\n}}\n"
+    spans = [one.primary.span for one in told]
+    assert [text[span.start : span.end] for span in spans] == found
+
+
+def test_an_index_that_lies_outside_whatever_the_input_is_told() -> None:
+    assert codes(body("xs[a + 4] := 1")) == ["RCS412"]
+
+
 def test_the_witness_is_the_least_in_declared_order() -> None:
     [found] = body("if a > 2 and c /= red { m := 30 / (a - 5) }")
     [column] = found.witnesses
