@@ -7,6 +7,7 @@ In: a log, or values; resolved programs. Out: the cycles that break a requiremen
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.leaves import spoken_of
@@ -15,10 +16,12 @@ from rcsc.lang.over_time import Watch
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.run.description import BadDescription, Description, places
-from rcsc.run.log.queries import Column
-from rcsc.run.log.read import Log, LoggedLevel
 from rcsc.run.log.states import LogColumn
 from rcsc.run.signature import Signature, Values
+
+if TYPE_CHECKING:  # reading a log needs its extra; watching values does not
+    from rcsc.run.log.queries import Column
+    from rcsc.run.log.read import Log, LoggedLevel
 
 
 def program_of(system: Path, name: str) -> Program:
@@ -97,7 +100,7 @@ def requirements(system: Path, described: Description, *, monitored: bool) -> di
     return {level: stated for level, stated in known.items() if stated}
 
 
-def broken_in(log: Log, wanted: Mapping[str, tuple[Property, ...]]) -> Iterator[BrokenRequirement]:
+def broken_in(log: "Log", wanted: Mapping[str, tuple[Property, ...]]) -> Iterator[BrokenRequirement]:
     """Yield each cycle of a log that breaks one of the requirements, level by level; one that reads what the log lacks is left out."""
     for level in log.levels:
         known = (stated for stated in wanted.get(level.name, ()) if _is_read(stated, level.sign))
@@ -109,7 +112,7 @@ def _is_read(stated: Property, sign: Signature) -> bool:
     return all(name.removeprefix(BEFORE) in sign.index for name in spoken_of(stated))
 
 
-def _broken_of(level: LoggedLevel, watches: list[LevelWatch]) -> Iterator[BrokenRequirement]:
+def _broken_of(level: "LoggedLevel", watches: list[LevelWatch]) -> Iterator[BrokenRequirement]:
     before: Values = ()
     for at, (tick, values) in enumerate(level.track if watches else ()):
         restart = level.restarted(at) if at else None
@@ -124,8 +127,8 @@ def _broken_of(level: LoggedLevel, watches: list[LevelWatch]) -> Iterator[Broken
 
 
 def kept_columns(
-    log: Log, wanted: Mapping[str, tuple[Property, ...]]
-) -> tuple[dict[str, Column], Callable[[int], Mapping[str, Values]]]:
+    log: "Log", wanted: Mapping[str, tuple[Property, ...]]
+) -> tuple[dict[str, "Column"], Callable[[int], Mapping[str, Values]]]:
     """Return a column for each requirement, false in the cycles that break it, and what gives their values in a tick."""
     broken = {(one.level, one.name, one.tick) for one in broken_in(log, wanted)}
     every = [(level, stated.name) for level, each in wanted.items() for stated in each]
