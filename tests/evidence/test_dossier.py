@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import rcsc.front.commands.tables.evidence  # noqa: F401  # it reads the kinds there are, before a test has others
 from rcsc.front.commands import run
 from rcsc.views.evidence import collect as collecting
 from rcsc.views.evidence.kind import Evidence, Kind, Subject

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import rcsc.front.commands.tables.evidence  # noqa: F401  # it reads the kinds there are, before a test has others
 from rcsc.driver.compile import Generated, tables_in
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
