@@ -14,7 +14,7 @@ checking and functional property verification", 2002).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, obligations, pairs
@@ -57,19 +57,10 @@ class Gates(Bits):
         self.clauses.clear()
         return self.all_of(units)
 
-    def both(self, a: Literal, b: Literal) -> Literal:
-        """Return the literal of *a and b*."""
-        if a in (b, TRUE) or b == FALSE:
-            return b
-        if b == TRUE or a == FALSE:
-            return a
-        if a == -b:
-            return FALSE
-        key = ("and", min(a, b), max(a, b))
-        if key not in self._gates:
-            gate = self._gates[key] = self.fresh()
-            self.ands[gate] = key[1:]
-        return self._gates[key]
+    def _conjunction(self, a: Literal, b: Literal) -> Literal:
+        gate = self.fresh()
+        self.ands[gate] = (a, b)
+        return gate
 
     def _same(self, a: Literal, b: Literal) -> Literal:
         if a in (TRUE, FALSE) or b in (TRUE, FALSE):
@@ -230,7 +221,6 @@ def circuit(
     firsts: Sequence[Cycle],
     step: Cycle,
     wanted: Sequence[Obligation],
-    known: Sequence[Node] = (),
 ) -> Circuit:
     """Make the circuit of a level for some of its obligations.
 
@@ -239,16 +229,12 @@ def circuit(
         firsts: The cycles with which it begins, of which no leaf before them is arbitrary.
         step: A cycle from any state.
         wanted: The obligations, of `step`.
-        known: Conditions that are known to hold before each later cycle; those about leaves in the cone of the obligations are made use of.
     """
     keys, in_pairs = tuple(owed.key for owed in wanted), any(owed.lines for owed in wanted)
     leaves, read = roots_of(step, wanted)
     gates = Gates()
     words = tuple(gates.word(step.before[name]) for name in leaves)
     later = _frame(gates, step, leaves, words, [owed.holds for owed in wanted])
-    telling = [condition for condition in known if values.variables([condition]).keys() <= set(leaves)]
-    lemmas = gates.all_of(map(gates.literal, telling))
-    later = replace(later, valid=gates.both(later.valid, lemmas))
     begun = []
     for first in firsts:
         owed = {one.key: one.holds for one in (*obligations(ts, first), *(pairs(first) if in_pairs else ()))}

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.compose.exact.circuit import EARLY, Circuit, Gate
-from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal, Word
+from rcsc.proof.symbolic.bits import TRUE, Literal, Word, known_both
 
 STARTED, ENDED, RESTARTS = "started", "ended", "restarts"
 
@@ -40,12 +40,8 @@ class _Whole:
 
     def both(self, a: Literal, b: Literal) -> Literal:
         """Return the literal of *a and b*."""
-        if FALSE in (a, b) or a == -b:
-            return FALSE
-        if a in (b, TRUE):
-            return b
-        if b == TRUE:
-            return a
+        if (known := known_both(a, b)) is not None:
+            return known
         gate = min(a, b), max(a, b)
         if gate not in self._made:
             self._made[gate] = made = self._fresh()

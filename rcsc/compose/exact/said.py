@@ -25,6 +25,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import Arithmetic
+from rcsc.lang.over_time.past import negation
 from rcsc.proof.solvers.horn import AtMost, Formula, Holds, Joined, Not, UnreadableError, Within
 
 Leaf = tuple[str, Scalar]
@@ -80,13 +81,6 @@ def _joined(op: Op, parts: Sequence[Expr]) -> Expr:
         return parts[0]
     half = len(parts) // 2
     return Apply(op, (_joined(op, parts[:half]), _joined(op, parts[half:])), Bool())
-
-
-def negation(condition: Expr) -> Expr:
-    """Negate a condition."""
-    if isinstance(condition, Apply) and condition.op is Op.NOT:
-        return condition.args[0]
-    return Apply(Op.NOT, (condition,), Bool())
 
 
 def _read(leaf: Leaf) -> Expr:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.exact.circuit import EARLY, Circuit, Frame
 from rcsc.proof.solvers.sat import Sat
-from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal
+from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal, known_both
 
 
 @dataclass(slots=True)
@@ -91,12 +91,8 @@ class Unrolled:
         return of[literal] if literal > 0 else -of[-literal]
 
     def _both(self, a: Literal, b: Literal) -> Literal:
-        if FALSE in (a, b) or a == -b:
-            return FALSE
-        if a in (b, TRUE):
-            return b
-        if b == TRUE:
-            return a
+        if (known := known_both(a, b)) is not None:
+            return known
         key = (a, b) if a < b else (b, a)
         gate = self._gates.get(key)
         if gate is None:

@@ -25,6 +25,15 @@ TRUE, FALSE = 1, -1
 WIDEST = 66
 
 
+def known_both(a: Literal, b: Literal) -> Literal | None:
+    """Return the literal of *a and b* where it takes no gate."""
+    if a in (b, TRUE) or b == FALSE:
+        return b
+    if b == TRUE or a == FALSE:
+        return a
+    return FALSE if a == -b else None
+
+
 @dataclass(slots=True)
 class Bits:
     """Makes literals and words; one of these for all the nodes of one question.
@@ -75,17 +84,18 @@ class Bits:
 
     def both(self, a: Literal, b: Literal) -> Literal:
         """Return the literal of *a and b*."""
-        if a in (b, TRUE) or b == FALSE:
-            return b
-        if b == TRUE or a == FALSE:
-            return a
-        if a == -b:
-            return FALSE
+        if (known := known_both(a, b)) is not None:
+            return known
         key = ("and", min(a, b), max(a, b))
         if key not in self._gates:
-            gate = self._gates[key] = self.fresh()
-            self.clauses += [[-gate, a], [-gate, b], [gate, -a, -b]]
+            self._gates[key] = self._conjunction(*key[1:])
         return self._gates[key]
+
+    def _conjunction(self, a: Literal, b: Literal) -> Literal:
+        """Make the gate of *a and b*."""
+        gate = self.fresh()
+        self.clauses += [[-gate, a], [-gate, b], [gate, -a, -b]]
+        return gate
 
     def all_of(self, literals: Iterable[Literal]) -> Literal:
         """Return the literal of all of them together."""
