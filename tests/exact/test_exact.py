@@ -13,6 +13,7 @@ from unittest.mock import patch
 import pytest
 import z3
 
+from rcsc.compose.contract import properties
 from rcsc.compose.contract.claims import SAFE
 from rcsc.compose.contract.obligations import ObligationKey, Sort, obligations
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
@@ -23,14 +24,16 @@ from rcsc.compose.exact.bounded import Looked, looked
 from rcsc.compose.exact.circuit import Circuit, Frame, Gates, circuit
 from rcsc.compose.exact.explicit import Explored
 from rcsc.compose.exact.export import aiger, btor2
-from rcsc.compose.exact.said import boxes, predicate
+from rcsc.compose.exact.said import boxes, of_formula, predicate
 from rcsc.compose.exact.spacer import Lemmas, related
+from rcsc.compose.invariant.search import search
 from rcsc.compose.proof.level import Verdict, certificate, prove_level
 from rcsc.compose.proof.system import transition_systems
 from rcsc.front.commands import run
 from rcsc.lang.interpret import holds
-from rcsc.lang.model import Int
+from rcsc.lang.model import Enum, Int, key_bounds, value_of_key
 from rcsc.lang.operator_table import Arithmetic, Op, divide
+from rcsc.proof.solvers.horn import AtMost
 from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.bits import TRUE
@@ -280,6 +283,56 @@ def test_states_are_said_as_few_boxes() -> None:
         ((4, 4), (4, 4)),
     ]
     assert boxes([]) == []
+
+
+COLOUR, SIZE, LENGTH = Enum("colour", ("red", "green", "blue")), Enum("size", ("s", "l")), Int(-2, 3)
+
+
+@pytest.mark.parametrize("equal", [False, True])
+@pytest.mark.parametrize("factors", list(product((-2, 1), (-1, 0, 2), (0, 1))))
+def test_a_sum_of_keys_is_said_as_it_is(factors: tuple[int, ...], equal: bool) -> None:
+    """Members of enumerations are not added in the language: they are said one by one."""
+    leaves = (("c", COLOUR), ("n", LENGTH), ("s", SIZE))
+    told = tuple((at, factor) for at, factor in enumerate(factors) if factor)
+    keys = [range(low, high + 1) for low, high in (key_bounds(kind) for _, kind in leaves)]
+    for most in (-3, 0, 2):
+        said = of_formula(AtMost(told, most, equal), leaves)
+        for state in product(*keys):
+            total = sum(state[at] * factor for at, factor in told)
+            now = {name: value_of_key(kind, key) for (name, kind), key in zip(leaves, state, strict=True)}
+            assert holds(said, now) == (total == most if equal else total <= most), (most, state)
+
+
+SLOW = """\
+input asked : bool
+input much : int 0 .. 1000000
+input less : int 0 .. 1000000
+state busy : bool
+state age : int 0 .. 600
+module grow reads busy, age writes age { if busy { age := min(age + 1, 600) } else { age := 0 } }
+table t {
+| line | busy | age | asked and much + 1 < less || busy |
+|---|---|---|---||---|
+| rests | false | | false || |
+| begins | false | | true || true |
+| goes_on | true | < 500 | || |
+| ends | true | >= 500 | || false |
+}
+requirement answered : while busy, within 500 cycles, not busy
+level solo { period 40 [ms] preprocess grow table t }
+"""
+"""Its inputs cannot be listed, and its counters go up side by side: no constant tells why the bound is kept."""
+
+
+@pytest.mark.parametrize("ahead", [-1, 2])
+def test_a_bound_is_proved_by_counters_that_go_up_side_by_side(ahead: int) -> None:
+    ts = alone(SLOW)
+    step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+    wanted = obligations(ts, step)
+    with patch.object(properties, "MOST_AHEAD", ahead):
+        found = search(ts, firsts, step, wanted, LITTLE)
+    left = {wanted[at].name for at in found.open}
+    assert left == ({"answered"} if ahead < 0 else set())
 
 
 LIGHT = """\

@@ -47,7 +47,7 @@ from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.execution import Run
 from rcsc.proof.symbolic.values import Node
 
-CLOSELY = 1
+CLOSELY = 2
 """The highest `closely`: each step retries what is not proved with more predicates."""
 
 
@@ -127,7 +127,7 @@ def predicates(
         ts: The level.
         cycle: From any state.
         obligations: The conditions to be proved.
-        closely: At 1 (`CLOSELY`), those on which procedures branch come after the others.
+        closely: From 1 on, those on which procedures branch come after the others.
     """
     inside = cone(cycle, obligations)
     program, kinds = ts.program, ts.kinds

@@ -10,9 +10,11 @@ condition (a division by zero, an index out of range) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from itertools import product
 
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.predicates import (
+    CLOSELY,
     Predicate,
     always_defined,
     cone,
@@ -31,6 +33,7 @@ from rcsc.lang.model import (
     WATCHED,
     Among,
     Apply,
+    Assign,
     Bool,
     Enum,
     Expr,
@@ -46,9 +49,12 @@ from rcsc.lang.model import (
     VariableName,
     earlier,
 )
+from rcsc.lang.over_time.past import number
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
 
+MOST_AHEAD = 2
+"""How far a counter of a monitor is looked at to be ahead of one of the level."""
 MOST_COUNTED = 12
 """How far counters are, as predicates: each number up to so many, besides those that something compares."""
 
@@ -151,7 +157,42 @@ def every_predicate(
         there = {predicate.name for predicate in chosen}
         closer = predicates(ts, cycle, wanted, closely)
         chosen = (*chosen, *(predicate for predicate in closer if predicate.name not in there))
-    return chosen
+    return (*chosen, *_side_by_side(ts, cone(cycle, wanted))) if closely == CLOSELY else chosen
+
+
+def _side_by_side(ts: TransitionSystem, inside: frozenset[str]) -> Iterator[Predicate]:
+    """Make predicates of how far a counter of a monitor is ahead of one of the level: they often go up together, in a cycle or the next."""
+    numbers = {below.number for below in ts.links.below}  # which go round
+    others = [(name, kind) for name, kind in _counters(ts.program) if name in inside and name not in numbers]
+    for _, monitor in monitors(ts.program):
+        for state in monitor.states:
+            if isinstance(state.type, Int) and state.name in inside:
+                for (name, kind), ahead in product(others, range(MOST_AHEAD + 1)):
+                    at_most = Apply(
+                        Op.ADD, (Read(name, kind), number(ahead)), Int(kind.low, kind.high + ahead)
+                    )
+                    condition = Apply(Op.LE, (Read(state.name, state.type), at_most), Bool())
+                    yield Predicate(spelled(condition), Bool(), condition=condition)
+
+
+def _counters(program: Program) -> Iterator[tuple[VariableName, Int]]:
+    """List the states of a level that its statements count up or down."""
+    counted = {v.name for v in program.variables if v.counts is not None}
+    for procedure in program.procedures:
+        for statement in everything(procedure.body):
+            if isinstance(statement, Assign):
+                counted |= {
+                    part.args[0].name
+                    for part in parts(statement.value)
+                    if isinstance(part, Apply)
+                    and part.op in (Op.ADD, Op.SUB)
+                    and isinstance(part.args[0], Read)
+                }
+    yield from (
+        (v.name, v.type)
+        for v in program.variables
+        if v.name in counted and isinstance(v.type, Int) and v.kind is not Kind.INPUT
+    )
 
 
 def _stated_conditions(ts: TransitionSystem) -> list[Expr]:

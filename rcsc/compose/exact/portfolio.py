@@ -28,9 +28,10 @@ STATED = frozenset({Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT})
 """Obligations that people state to help a proof."""
 CYCLES = 8
 """Cycles of the runs that are looked at before anything is proved."""
-ROUNDS = (1_000_000, 4_000_000, 60_000_000)
-"""Steps that Spacer gets for an obligation, round after round: the first takes less than a second."""
-TOGETHER = 90_000_000
+ROUNDS = ((1_000_000, True), (4_000_000, True), (20_000_000, False), (60_000_000, True))
+"""Steps that Spacer gets for an obligation, round after round, and whether it is told what else is proved: that may help or lead astray.
+The first takes less than a second."""
+TOGETHER = 110_000_000
 """Steps that it gets for all obligations of a level together."""
 
 
@@ -120,7 +121,7 @@ class _Open:
     def relate(self) -> None:
         """Ask Spacer for each obligation, until a round proves nothing more."""
         spent = 0
-        for steps in ROUNDS:
+        for steps, told in ROUNDS:
             before = None
             while self.left and self.left != before:
                 before = self.left
@@ -129,21 +130,22 @@ class _Open:
                         return
                     spent += steps
                     answer, conditions = related(
-                        self.ts, self.firsts, self.step, self.wanted[at], self._lemmas(), steps
+                        self.ts, self.firsts, self.step, self.wanted[at], self._lemmas(told=told), steps
                     )
                     if answer is Answer.UNSATISFIABLE:
                         self.proved([at], conditions, "by Spacer")
                     elif answer is Answer.SATISFIABLE:
                         self.found.broken.add(self.wanted[at].key)
 
-    def _lemmas(self) -> Lemmas:
+    def _lemmas(self, *, told: bool) -> Lemmas:
+        """Return the invariant; with the obligations that are proved and that people have stated, if that is to be `told`."""
         invariant = self.found.invariant
         return Lemmas(
             tuple(held(invariant.predicates, invariant.clauses, self.step.before)),
             tuple(
                 owed.holds
                 for at, owed in enumerate(self.wanted)
-                if owed.sort in STATED and at not in invariant.open
+                if told and owed.sort in STATED and at not in invariant.open
             ),
         )
 

@@ -25,7 +25,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.operator_table import Arithmetic
-from rcsc.lang.over_time.past import negation
+from rcsc.lang.over_time.past import TRUE, either, negation
 from rcsc.proof.solvers.horn import AtMost, Formula, Holds, Joined, Not, UnreadableError, Within
 
 Leaf = tuple[str, Scalar]
@@ -140,13 +140,31 @@ def _linear(formula: AtMost, leaves: Sequence[Leaf]) -> Expr:
             if factor > 0:
                 return between(leaves[at], least, formula.most // factor)
             return between(leaves[at], -(formula.most // -factor), greatest)
-    if any(not isinstance(leaves[at][1], Int) for at, _ in formula.factors):
-        raise UnreadableError
+    for at, _ in formula.factors:
+        if isinstance(leaves[at][1], Enum):
+            return _member_by_member(formula, at, leaves)
+        if not isinstance(leaves[at][1], Int):
+            raise UnreadableError
     left = [(at, factor) for at, factor in formula.factors if factor > 0]
     right = [(at, -factor) for at, factor in formula.factors if factor < 0]
     over, under = (0, formula.most) if formula.most >= 0 else (-formula.most, 0)
     return Apply(
         Op.EQ if formula.equal else Op.LE, (_sum(left, over, leaves), _sum(right, under, leaves)), Bool()
+    )
+
+
+def _member_by_member(formula: AtMost, of: int, leaves: Sequence[Leaf]) -> Expr:
+    """Say a sum to which the key of an enumeration adds: members are not added in the language, so each is looked at by itself."""
+    low, high = key_bounds(leaves[of][1])
+    factor = dict(formula.factors)[of]
+    others = tuple((at, by) for at, by in formula.factors if at != of)
+    return _joined(
+        Op.AND,
+        [
+            either(negation(between(leaves[of], key, key)), rest)
+            for key in range(low, high + 1)
+            if (rest := _linear(AtMost(others, formula.most - factor * key, formula.equal), leaves)) != TRUE
+        ],
     )
 
 
