@@ -31,7 +31,7 @@ from rcsc.compose.proof.level import Verdict, certificate, prove_level
 from rcsc.compose.proof.system import transition_systems
 from rcsc.front.commands import run
 from rcsc.lang.interpret import holds
-from rcsc.lang.model import Enum, Int, key_bounds, value_of_key
+from rcsc.lang.model import Enum, Int, Scalar, key_bounds, value_of_key
 from rcsc.lang.operator_table import Arithmetic, Op, divide
 from rcsc.proof.solvers.horn import AtMost
 from rcsc.proof.solvers.smt import Answer
@@ -292,7 +292,7 @@ COLOUR, SIZE, LENGTH = Enum("colour", ("red", "green", "blue")), Enum("size", ("
 @pytest.mark.parametrize("factors", list(product((-2, 1), (-1, 0, 2), (0, 1))))
 def test_a_sum_of_keys_is_said_as_it_is(factors: tuple[int, ...], equal: bool) -> None:
     """Members of enumerations are not added in the language: they are said one by one."""
-    leaves = (("c", COLOUR), ("n", LENGTH), ("s", SIZE))
+    leaves: tuple[tuple[str, Scalar], ...] = (("c", COLOUR), ("n", LENGTH), ("s", SIZE))
     told = tuple((at, factor) for at, factor in enumerate(factors) if factor)
     keys = [range(low, high + 1) for low, high in (key_bounds(kind) for _, kind in leaves)]
     for most in (-3, 0, 2):

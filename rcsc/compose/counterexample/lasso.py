@@ -30,6 +30,10 @@ class Lasso:
     first: int
 
 
+MOST_EFFORT = 30_000_000
+"""No longer lassos are looked for after so much (`Sat.effort`): each cycle more may begin a lasso anywhere before it."""
+
+
 def obligation_of(table: str) -> Obligation:
     """Return the obligation that the table's command ends, which is not about one cycle."""
     return Obligation(Sort.ENDS, table, "", values.TRUE)
@@ -43,7 +47,7 @@ def lassos(
     by_table: dict[str, Lasso | NotReproducedError] = {}
     for _ in range(search.most):
         waiting = [table for table in tables if table not in by_table]
-        if not waiting:
+        if not waiting or run.effort > MOST_EFFORT:
             break
         run.further()
         for table in waiting:

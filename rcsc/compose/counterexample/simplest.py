@@ -57,6 +57,11 @@ class Bounded:
         """
         return self._sat.holds(assuming)
 
+    @property
+    def effort(self) -> int:
+        """What the answers so far took (`Sat.effort`)."""
+        return self._sat.effort
+
     def met(self, node: Node) -> bool:
         """Return whether anything stated or asked contains the node."""
         return self._bits.met(node)

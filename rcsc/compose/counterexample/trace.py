@@ -250,6 +250,11 @@ class Unrolled:
         """
         return self._run.holds([self._run.literal(wrong)])
 
+    @property
+    def effort(self) -> int:
+        """What the answers so far took (`Sat.effort`)."""
+        return self._run.effort
+
     def reproduced(self, obligation: Obligation, wrong: Node) -> TraceResult:
         """Run the simplest run that ends so; return it, or an error if it does not break the obligation.
 

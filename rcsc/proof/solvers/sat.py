@@ -101,6 +101,11 @@ class Sat:
         """Return the unsatisfiable core of the assumptions of the last question."""
         return frozenset(self._solver.get_core() or ())
 
+    @property
+    def effort(self) -> int:
+        """What the answers so far took: literals that followed from others, the same number on every machine."""
+        return int(self._solver.accum_stats()["propagations"])
+
     def close(self) -> None:
         """Free the solver's memory, which Python does not see."""
         self._solver.delete()
