@@ -28,6 +28,7 @@ from rcsc.run.log.read import read
 from rcsc.run.log.replay import Replay
 from rcsc.run.log.ticks import frames
 from rcsc.run.system import System
+from tests.studio import driven
 from tests.studio.served import Page, Refused, page, serving, until
 from tests.support.programs.examples import EXTERN
 from tests.support.programs.stages import program_of
@@ -522,6 +523,43 @@ def test_tracks_are_told_once_and_anew_after_undo(dock: Path) -> None:
             assert len((await one.ask("time.tracks", era=-1, since=-1))["marks"]) == left, line
 
     studio(dock, work)
+
+
+def test_a_requirement_that_every_run_watches_is_a_mark_where_it_is_broken(tmp_path: Path) -> None:
+    """Live, after ticks were taken back, and in a log; a cycle that breaks one that is not monitored is found, not marked."""
+    path = driven.dock(
+        tmp_path / "dock",
+        (
+            "level drive {",
+            "requirement near monitored : never travelled_mm > 20 [mm]\nrequirement at_home : always travelled_mm < 10 [mm]\nlevel drive {",
+        ),
+    )
+    assert rcsc(["compile", str(path.parent)]) == 0
+
+    async def marks(one: Page) -> list[tuple[int, str]]:
+        every = (await one.ask("time.tracks", era=-1, since=-1))["marks"]
+        return [(each["tick"], each["text"]) for each in every if each["kind"] == "finding"]
+
+    async def work(one: Page, _: Page) -> None:
+        for line in ("step 2", "order supervisor dock", "step 3"):
+            await shown(one, line)
+        assert await marks(one) == []
+        await shown(one, "step 40")
+        far = (await marks(one))[0]
+        assert far[1].startswith("requirement `drive.near` is broken: `travelled_mm` = ")
+        assert (await one.ask("time.find", text="not drive.near", tick=0, back=False)) == {"tick": far[0]}
+        home = (await one.ask("time.find", text="not drive.at_home", tick=0, back=False))["tick"]
+        assert home < far[0]
+        await shown(one, f"undo {2 + 3 + 40 - far[0] + 1}")
+        assert await marks(one) == []
+        for line in ("log run.mcap", "step 2", "log off"):
+            await shown(one, line)
+        assert (await marks(one))[0] == far
+        [name] = [each["name"] for each in await one.ask("log.list") if each["name"].endswith("run.mcap")]
+        await one.ask("log.open", name=name)
+        assert far in await marks(one)
+
+    studio(path, work)
 
 
 def test_why_says_of_each_line_what_the_interpreter_says(dock: Path) -> None:

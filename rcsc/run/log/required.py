@@ -4,10 +4,10 @@ In: a log, or values; resolved programs. Out: the cycles that break a requiremen
 `rcsc prove` proves: executors have no part in it.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.leaves import spoken_of
@@ -103,27 +103,46 @@ def requirements(system: Path, described: Description, *, monitored: bool) -> di
 def broken_in(log: "Log", wanted: Mapping[str, tuple[Property, ...]]) -> Iterator[BrokenRequirement]:
     """Yield each cycle of a log that breaks one of the requirements, level by level; one that reads what the log lacks is left out."""
     for level in log.levels:
-        known = (stated for stated in wanted.get(level.name, ()) if _is_read(stated, level.sign))
-        watches = [watch_of(stated, level.sign) for stated in known]
-        yield from _broken_of(level, watches)
+        yield from WatchedTrack.of(level.sign, wanted.get(level.name, ())).further(level)
 
 
 def _is_read(stated: Property, sign: Signature) -> bool:
     return all(name.removeprefix(BEFORE) in sign.index for name in spoken_of(stated))
 
 
-def _broken_of(level: "LoggedLevel", watches: list[LevelWatch]) -> Iterator[BrokenRequirement]:
-    before: Values = ()
-    for at, (tick, values) in enumerate(level.track if watches else ()):
-        restart = level.restarted(at) if at else None
-        if restart is not None:
-            before = restart.values
-        for watch in watches if at else ():
-            if not level.follows(at) or (restart is not None and not restart.by_hand):
-                watch.watch.begin()  # begun anew, or nobody knows what was in between
-            if shown := watch.broken(before, values):
-                yield BrokenRequirement(level.name, watch.stated.name, tick, watch.stated.text, shown)
-        before = values
+@dataclass(slots=True)
+class WatchedTrack:
+    """The cycles of a level, watched as they come.
+
+    Attributes:
+        looked_at: How many of its records were.
+    """
+
+    watches: Sequence[LevelWatch]
+    looked_at: int = 0
+    _before: Values = ()
+
+    @classmethod
+    def of(cls, sign: Signature, wanted: Iterable[Property]) -> Self:
+        """Watch requirements on a level of this signature, but those that read what it lacks."""
+        return cls([watch_of(stated, sign) for stated in wanted if _is_read(stated, sign)])
+
+    def further(self, level: "LoggedLevel") -> Iterator[BrokenRequirement]:
+        """Yield each cycle that breaks a requirement, of those that were not looked at yet."""
+        track = level.track
+        for at in range(self.looked_at, len(track.ticks)) if self.watches else ():
+            self.looked_at = at + 1
+            values = track.layout.unpack(track.packed[at])
+            restart = level.restarted(at) if at else None
+            if restart is not None:
+                self._before = restart.values
+            for watch in self.watches if at else ():
+                if not level.follows(at) or (restart is not None and not restart.by_hand):
+                    watch.watch.begin()  # begun anew, or nobody knows what was in between
+                if shown := watch.broken(self._before, values):
+                    stated = watch.stated
+                    yield BrokenRequirement(level.name, stated.name, track.ticks[at], stated.text, shown)
+            self._before = values
 
 
 def kept_columns(

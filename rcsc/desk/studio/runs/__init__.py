@@ -14,5 +14,6 @@ What it did is kept as a log is (`history`), so that one way of showing serves a
 What it costs: a copy of each level's values a cycle, kept once where they come again. Nothing here is trusted for a verdict.
 
 Modules, in the order the data flows: `live` is the session, `history` what it did, with what nobody had set; `logs` opens files, with
-what each breaks; `shown` is a run as pages draw it; `timeline` answers about any tick of either.
+what each breaks; `shown` is a run as pages draw it, `watching` which requirements over time it breaks; `timeline` answers about any tick
+of either.
 """

@@ -6,8 +6,9 @@ so that a cell is judged on the values that the table saw.
 """
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from typing import Any
 
 from rcsc.base.diagnostics.coded import Refused
@@ -18,6 +19,7 @@ from rcsc.desk.studio.runs.history import History
 from rcsc.desk.studio.runs.live import LANE, Live, Mark, level_shown, range_of
 from rcsc.desk.studio.runs.logs import KeptFinding
 from rcsc.desk.studio.runs.shown import Lines, Shown
+from rcsc.desk.studio.runs.watching import Watched
 from rcsc.lang.interpret import (
     UNDEFINED,
     ExternError,
@@ -26,11 +28,12 @@ from rcsc.lang.interpret import (
     holds,
 )
 from rcsc.lang.leaves import conjuncts, read_by
-from rcsc.lang.model import Expr, Line, Procedure, Program, Table, Test, Value, spell
+from rcsc.lang.model import Expr, Line, Procedure, Program, Property, Table, Test, Value, spell
 from rcsc.run.description import BadDescription, description
-from rcsc.run.log.queries import BadCondition, predicate
+from rcsc.run.log.queries import BadCondition, Predicate, predicate
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.signature import Signature, number_word
+from rcsc.run.log.required import BrokenRequirement, kept_columns
+from rcsc.run.signature import Signature, Values, number_word
 
 MOST_MARKED = 1000
 LONGEST = 4000
@@ -65,6 +68,7 @@ class TimeLine(Concern):
         self.live, self._tell = live, tell
         self._log: Source | None = None
         self._lines, self._shown = Lines(), Shown()
+        self._watched: tuple[History, Watched] | None = None
 
     def greeting(self) -> Json:
         """Return the run that everybody looks at."""
@@ -155,14 +159,39 @@ class TimeLine(Concern):
             "first": history.first,
             "last": history.last,
             "levels": levels,
-            "marks": [asdict(mark) for mark in self._marks()][-MOST_MARKED:],
+            "marks": [asdict(mark) for mark in sorted(self._marks(), key=attrgetter("tick"))][-MOST_MARKED:],
         }
 
     def _marks(self) -> Iterator[Mark]:
+        for broken in self._broken():
+            text = f"requirement `{broken.level}.{broken.name}` is broken: {broken.shown}"
+            yield Mark(broken.tick, "finding", text)
         if self._log is None:
             yield from self.live.marks
         elif self._log.finding is not None:
             yield Mark(self._log.finding.tick, "finding", self._log.finding.text)
+
+    def _broken(self) -> Sequence[BrokenRequirement]:
+        """Return the cycles known that break a requirement over time which every run watches."""
+        history = self.source.history
+        if not history.logs:
+            return ()
+        if self._watched is None or self._watched[0] is not history:
+            self._watched = history, Watched()
+        self._watched[1].look(history, self._monitored)
+        return self._watched[1].broken
+
+    def _required(self, logged: LoggedLevel) -> tuple[Property, ...]:
+        """Return the requirements over time of a level; none where it ran other tables than those that are here."""
+        try:
+            with PROVER:
+                stated = self._program(logged).properties
+        except Refused:
+            return ()
+        return tuple(one for one in stated if one.monitor is not None)
+
+    def _monitored(self, logged: LoggedLevel) -> Sequence[Property]:
+        return [one for one in self._required(logged) if one.monitored]
 
     # --- values ---
 
@@ -235,18 +264,20 @@ class TimeLine(Concern):
         tick, back = self._tick(ask), ask.body.flag("back")
         history = self.history()
         ticks = range(tick - 1, history.first, -1) if back else range(tick + 1, history.last + 1)
-        asked: dict[int, Any] = {}
+        asked: dict[int, tuple[Predicate, Callable[[int], Mapping[str, Values]]]] = {}
         for count, at in enumerate(ticks):
             log = history.ran_at(at)
             if id(log) not in asked:
+                columns, kept = kept_columns(log, {one.name: self._required(one) for one in log.levels})
                 try:
-                    asked[id(log)] = predicate(text, log.levels)
+                    asked[id(log)] = predicate(text, log.levels, columns), kept
                 except BadCondition as error:
                     raise Refused(Code.STUDIO, str(error), *error.helps) from error
             if count % _BREATH == 0:
                 ask.progress("searching", count, len(ticks))
             held = {one.name: values for one in log.levels if (values := one.track.latest(at)) is not None}
-            if asked[id(log)](held):
+            holds_here, kept = asked[id(log)]
+            if holds_here({**held, **kept(at)}):
                 return {"tick": at}
         return {"tick": None}
 
