@@ -150,6 +150,22 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
     )
 
 
+def prove_again(
+    ts: TransitionSystem, known: LevelProof, effort: Effort, *, more_stated: bool = False
+) -> LevelProof:
+    """Prove a level in its one environment, of which another version is proved: its clauses are the first that the search tries.
+
+    Args:
+        ts: The level, refusing inputs or not as that version does.
+        known: The proof of that version.
+        effort: For the search.
+        more_stated: Whether the version is this one, with less stated of it: what is proved there is not shown again.
+    """
+    begun = Candidates(FoundInvariant(known.predicates, known.clauses).named, content(ts))
+    shown = _Refusing(known, stands=True) if more_stated else None
+    return _proved(ts, effort, None, begin(ts, (), effort), begun, shown)
+
+
 @dataclass(frozen=True, slots=True)
 class _Refusing:
     """The proof of a level whose inputs may be refused: what it has shown need not be shown again where none is.

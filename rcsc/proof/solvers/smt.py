@@ -577,6 +577,12 @@ class Solver:
             _open.append(why)
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
 
+    def core(self, *assuming: Term) -> tuple[Term, ...]:
+        """Return those of the terms assumed in the last question, constants or negated ones, that suffice for its unsatisfiable answer."""
+        used = {one.get_id() for one in self._solver.unsat_core()}
+        every: tuple[Any, ...] = assuming
+        return tuple(Term(one) for one in every if one.get_id() in used)
+
     def possible(self, *assuming: Term) -> bool:
         """Return whether all asserted terms, and these, hold together for some values.
 

@@ -1,0 +1,219 @@
+"""Slips that survive: an assignment, or all that a line does, is left out, and whatever was proved of the level still holds.
+
+In: the proofs of a level. Out: a verdict on each `Slip`, and by which claims it is noticed. Cheapest first: what the slip leaves of the
+invariant may still show everything; a run may break something; at last an invariant is searched, `MOST_SEARCHED` times at most. What is
+neither shown nor broken is *open*, never a survivor.
+
+Left out is one assignment of a procedure in all of its uses, one cell of a line, or all cells of a line. A slip that leaves every reachable
+cycle as it is *changes nothing*: no requirement can notice it. Whether commands end is not asked again.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from rcsc.compose.contract.claims import ACCEPTED, Key
+from rcsc.compose.contract.obligations import obligations
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.coverage.parts import How, Part, Use, of_program
+from rcsc.compose.coverage.questions import LIMITS, Member, Questions, with_program
+from rcsc.compose.coverage.tried import short_runs, tried
+from rcsc.compose.invariant.search import Effort, FoundInvariant, begin, search
+from rcsc.compose.proof.level import LevelProof
+from rcsc.proof.solvers import smt
+from rcsc.proof.solvers.sat import GaveUpError
+
+SHORT, LONGER = 4, 8
+"""Cycles of the runs that are looked for, at first and of what is then left."""
+MOST_SEARCHED = 8
+"""Slips for which an invariant is searched: each may take as long as the proof of the level."""
+FEW_WALKS, STEPS = 4, 200_000_000
+"""The walks before such a search, and the steps of Z3 within it."""
+
+
+class Fate(StrEnum):
+    """What becomes of a slip."""
+
+    SURVIVES = "survives"
+    CHANGES_NOTHING = "changes nothing"
+    NOTICED = "noticed"
+    OPEN = "open"
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """What is left out.
+
+    Attributes:
+        uses: All of it.
+        whole_line: Whether it is all that a line does.
+    """
+
+    uses: tuple[Use, ...]
+    whole_line: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A slip with its verdict; `by`, the claims that were seen to notice it."""
+
+    slip: Slip
+    fate: Fate
+    by: tuple[Key, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    """A level in one environment, with what is proved of it there and in none that allows more.
+
+    Attributes:
+        ts: The level, refusing inputs or not.
+        proof: Its proof.
+        keys: The claims.
+    """
+
+    ts: TransitionSystem
+    proof: LevelProof
+    keys: tuple[Key, ...]
+
+
+def environments(ts: TransitionSystem, proof: LevelProof) -> tuple[Environment, ...]:
+    """Return the environments in which claims about a level are proved: with refused inputs, where that suffices."""
+    if not proof.parts:
+        every = tuple(owed.key for owed, verdict in proof.verdicts if verdict in ACCEPTED)
+        return (Environment(ts.refusing(), proof, every),) if every else ()
+    refusing, admitting = proof.parts
+    first = tuple(owed.key for owed, verdict in refusing.verdicts if verdict in ACCEPTED)
+    rest = tuple(
+        owed.key for owed, verdict in admitting.verdicts if verdict in ACCEPTED and owed.key not in first
+    )
+    both = (Environment(ts.refusing(), refusing, first), Environment(ts, admitting, rest))
+    return tuple(one for one in both if one.keys)
+
+
+def slips_of(uses: Sequence[Use]) -> Iterator[Slip]:
+    """Yield each slip: what every line does, then each assignment, in the order of the program."""
+    by_line, by_part = dict[tuple[str, str], list[Use]](), dict[Part, list[Use]]()
+    for use in uses:
+        if use.part.stays:
+            continue
+        by_part.setdefault(use.part, []).append(use)
+        if use.table:
+            by_line.setdefault((use.table, use.line), []).append(use)
+    yield from (Slip(tuple(every), whole_line=True) for every in by_line.values() if len(every) > 1)
+    yield from (Slip(tuple(every), whole_line=False) for every in by_part.values())
+
+
+def judged(places: Sequence[Environment]) -> Iterator[Judged]:
+    """Judge every slip of a level whose claims are proved in these environments: each line's first, then what is left.
+
+    A cell of a line that may do nothing at all is told with it.
+    """
+    every = [_Asked(one, Questions(one.ts, one.proof, How.LEFT_OUT)) for one in places]
+    lines, parts = list[Slip](), list[Slip]()
+    for slip in slips_of(list(every[0].asked.made.switches)):
+        (lines if slip.whole_line else parts).append(slip)
+    told = _Judge(every)
+    verdicts = told.of(lines)
+    yield from verdicts
+    silent = {use for one in verdicts if one.fate is Fate.SURVIVES for use in one.slip.uses}
+    left = [slip for slip in parts if slip.uses[0].part.procedure or not silent.issuperset(slip.uses)]
+    yield from told.of(left)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """An environment with its questions."""
+
+    place: Environment
+    asked: Questions
+
+    def on(self, slip: Slip) -> frozenset[Member]:
+        """Return what is on."""
+        return frozenset(self.asked.members).difference(slip.uses)
+
+
+@dataclass(slots=True)
+class _Judge:
+    """Judges slips.
+
+    Attributes:
+        searched: For how many an invariant was searched.
+    """
+
+    every: Sequence[_Asked]
+    searched: int = 0
+
+    def of(self, slips: Sequence[Slip]) -> list[Judged]:
+        """Judge slips, in order."""
+        broken = self._short_runs(slips, SHORT)
+        verdicts = {at: Judged(slips[at], Fate.NOTICED, (key,)) for at, key in broken.items()}
+        for at, slip in enumerate(slips):
+            if at not in verdicts and all(_kept(one, slip, one.place.keys) is not None for one in self.every):
+                verdicts[at] = Judged(slip, self._survives(slip))
+        left = [at for at in range(len(slips)) if at not in verdicts]
+        longer = self._short_runs([slips[at] for at in left], LONGER)
+        verdicts |= {left[at]: Judged(slips[left[at]], Fate.NOTICED, (key,)) for at, key in longer.items()}
+        for at in left:
+            if at not in verdicts:
+                verdicts[at] = self._at_last(slips[at])
+        return [verdicts[at] for at in range(len(slips))]
+
+    def _short_runs(self, slips: Sequence[Slip], cycles: int) -> Mapping[int, Key]:
+        """Find runs in which no input is refused: they are runs of every environment."""
+        asked = self.every[0].asked
+        ts = with_program(asked.ts, asked.made.program, asked.ts).admitting()
+        keys = {key for one in self.every for key in one.place.keys}
+        ts.refusable, ts.clamped, ts.trusted = asked.ts.refusable, asked.ts.clamped, asked.ts.trusted
+        return short_runs(ts, asked.made, [slip.uses for slip in slips], keys, cycles) if slips else {}
+
+    def _survives(self, slip: Slip) -> Fate:
+        same = all(one.asked.changes_nothing(one.on(slip)) for one in self.every)
+        return Fate.CHANGES_NOTHING if same else Fate.SURVIVES
+
+    def _at_last(self, slip: Slip) -> Judged:
+        """Look at all runs, where that is possible; search another invariant, as long as there are not too many to search."""
+        runs = [tried(slipped(one.place, slip), one.place.keys) for one in self.every]
+        if by := tuple(sorted({key for run in runs for key in run.broken})):
+            return Judged(slip, Fate.NOTICED, by)
+        if self.searched >= MOST_SEARCHED:
+            return Judged(slip, Fate.OPEN)
+        self.searched += 1
+        shown = all(_searched(one, slip) for one in self.every)
+        return Judged(slip, self._survives(slip) if shown else Fate.OPEN)
+
+
+def _kept(one: _Asked, slip: Slip, keys: Sequence[Key]) -> tuple[int, ...] | None:
+    """Return the clauses that are left of the invariant, if they show these claims."""
+    clauses = one.asked.kept(one.on(slip), one.asked.clauses)
+    shows = clauses is not None and one.asked.follow(keys, one.on(slip), clauses)
+    return clauses if shows else None
+
+
+def slipped(place: Environment, slip: Slip) -> TransitionSystem:
+    """Return the level with the slip."""
+    program = of_program(place.ts.program, place.ts.level, How.LEFT_OUT, slip.uses)
+    return with_program(place.ts, program, place.ts)
+
+
+def _searched(one: _Asked, slip: Slip) -> bool:
+    """Search the invariant of a level with a slip, from what is left of the one it has; return whether Z3 confirms that it shows all."""
+    ts, proof = slipped(one.place, slip), one.place.proof
+    cycle, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+    wanted = obligations(ts, cycle)
+    left = one.asked.kept(one.on(slip), one.asked.clauses) or ()
+    clauses = [proof.clauses[at] for at in left]
+    effort = Effort(walks=FEW_WALKS, limits=LIMITS)
+    owed = frozenset(at for at, each in enumerate(wanted) if each.key in one.place.keys)
+    begun = replace(begin(ts, wanted, effort), open=owed)
+    named = FoundInvariant(proof.predicates, tuple(clauses)).named
+    try:
+        with smt.together(STEPS):
+            found = search(ts, firsts, cycle, wanted, effort, named, begun)
+    except GaveUpError:
+        return False
+    if found.open:
+        return False
+    again = Questions(ts, replace(proof, predicates=found.predicates, clauses=found.clauses), How.LEFT_OUT)
+    kept = again.kept(again.members, again.clauses)
+    return kept is not None and again.follow(one.place.keys, again.members, kept)
