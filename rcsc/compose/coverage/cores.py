@@ -21,8 +21,8 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import prove_again
 from rcsc.proof.solvers import smt
 
-STEPS = 60_000_000
-"""Steps of Z3 to make the core of one requirement smaller, some tens of seconds; then it is left as it is."""
+STEPS = 15_000_000
+"""Steps of Z3 to make the core of one requirement smaller, some ten seconds; then it is left as it is."""
 MOST_TRIED, CYCLES = 60, 6
 """Members of a core that are looked at one by one, and cycles of the runs that are looked for first."""
 

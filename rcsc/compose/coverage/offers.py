@@ -46,6 +46,8 @@ from rcsc.lang.resolve import resolve
 MOST_LINES = 3
 """Lines of which one assignment is looked at."""
 _NEXT = pending("")
+_LOOSE = frozenset({Op.OR, Op.XOR, Op.IMPLIES})
+"""Operators that bind less than `and`."""
 
 
 def offer(places: Sequence[Environment], slip: Slip, loaded: Loaded) -> str | None:
@@ -142,10 +144,9 @@ def _plain(condition: Expr) -> Expr:
 
 
 def _joined(conditions: Sequence[Expr]) -> str:
-    every = conditions[0]
-    for condition in conditions[1:]:
-        every = Apply(Op.AND, (every, condition), Bool())
-    return words(every)
+    return " and ".join(
+        f"({words(one)})" if isinstance(one, Apply) and one.op in _LOOSE else words(one) for one in conditions
+    )
 
 
 class _Around:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
@@ -32,6 +33,9 @@ from rcsc.views.trace.page import page
 from rcsc.views.trace.requirements import covered, findings, listed, of_scripts, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
 
+if TYPE_CHECKING:
+    from rcsc.compose.coverage.covered import Coverage
+
 MOST_SHOWN = 10
 """Lines of generated code that come from nothing, named in one finding."""
 _SAID = {
@@ -40,6 +44,8 @@ _SAID = {
     KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
     KnownVerdict.NOT_PROVED: REFUTED,
 }
+SURVIVES = "survives"
+"""What becomes of a slip that nothing notices (`compose.coverage.slips`)."""
 ANY_CODE = CodeWanted()
 """What lies beside the project, if it does."""
 
@@ -139,9 +145,12 @@ def _matrix(
 ) -> Matrix:
     settings.progress(f"tracing {program.program.file}")
     [proof] = [proof for proof in project.proofs if proof.proved is program]
+    told = [(found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics]
+    if cache is not None:
+        told += unspoken_of(program.program, cache)
     known = ProgramFacts(
         _table_proofs(proof.tables),
-        tuple((found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics),
+        tuple(told),
         whole_vectors(program, settings) if wanted.vectors else None,
         {} if cache is None else property_proofs(program.program, cache),
         project.loaded.sources,
@@ -165,6 +174,44 @@ def _table_proofs(reports: Iterable[TableReport]) -> dict[str, TableProof]:
 def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
     """Return the verdicts of earlier proofs of the levels together on each property; those that nobody proved are left out."""
     return dict(_known(program, cache)) if program.properties else {}
+
+
+def unspoken_of(program: Program, cache: Cache) -> Iterator[tuple[Span, str]]:
+    """Yield the lines of which no requirement needs anything, or some, as an earlier `rcsc prove --coverage` found, each with its place."""
+    levels = {one.name: os.path.realpath(one.span.file) for one in program.levels}
+    for system in systems_above(program.file) if levels and program.properties else ():
+        there = cache_of(Path(system).parent, cache)
+        standing = known_of(system, there)
+        if standing is not None:
+            from rcsc.compose.coverage.kept import recalled  # it takes a while, and most are asked without
+
+        for level in () if standing is None else standing.outline.levels:
+            coverage = recalled(there, level.content) if levels.get(level.name) == level.file else None
+            if coverage is not None:
+                yield from _unspoken_of(program, coverage)
+        if standing is not None:
+            return
+
+
+def _unspoken_of(program: Program, coverage: "Coverage") -> Iterator[tuple[Span, str]]:
+    silent = {
+        (one.slip.uses[0].table, one.slip.uses[0].line)
+        for one in coverage.slips
+        if one.slip.whole_line and one.fate == SURVIVES
+    }
+    left = dict[tuple[str, str], list[str]]()
+    for use in coverage.unneeded if coverage.cores else ():
+        left.setdefault((use.table, use.line), []).extend(use.part.leaves)
+    for table in program.tables:
+        for line in table.every_line:
+            at = str(table.name), str(line.name)
+            if leaves := dict.fromkeys(left.get(at, ())):
+                yield line.span, f"no requirement speaks of what it writes to {', '.join(leaves)}"
+            if at in silent:
+                yield (
+                    line.span,
+                    "without all that it does, everything that is proved of the level still holds",
+                )
 
 
 def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:

@@ -26,6 +26,7 @@ Examples:
   rcsc prove --export aiger questions          each level and what it owes, for another model checker
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
   rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
+  rcsc prove --level task --coverage           what requirements speak of, and what none would notice
   rcsc prove --where "stock = 0"               traces that begin with an empty stock
   rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
@@ -62,6 +63,8 @@ Examples:
               help="Write each level, exact, and what it owes to DIR for another model checker, and prove nothing.")  # fmt: skip
 @click.option("--show", "shows", multiple=True, metavar="NAME",
               help="Print a run that asks for the response of the requirement over time NAME, and prove nothing (repeatable).")  # fmt: skip
+@click.option("--coverage", is_flag=True,
+              help="Print, too, what each property and requirement needs, and what can be left out unnoticed.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--progress", is_flag=True,
               help="Print each level on standard error once it is done; a terminal always shows it.")  # fmt: skip
@@ -74,7 +77,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None, shows: tuple[str, ...],
-    no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
+    coverage: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -100,7 +103,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if (
         cache is not None
         and path is not None
-        and not (logs or freeze or certificate or confirms or exports or shows or progress)
+        and not (logs or freeze or certificate or confirms or exports or shows or coverage or progress)
     ):
         known = recall_lines(cache, path, key)
         if known is not None:
@@ -123,6 +126,6 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         return shown_by_runs(path, shows, cycles)
     asked = Asked(
         only, steps, jobs, cycles, further, begins, logs, freeze, variants, certificate, confirms, progress, strict, invariants,
-        as_json,
+        as_json, coverage,
     )  # fmt: skip
     return proved(path, asked, cache, key)

@@ -22,6 +22,8 @@ from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, exercising, explain, file_name
 from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
 from rcsc.compose.counterexample.trace import usual_length
+from rcsc.compose.coverage.covered import Coverage
+from rcsc.compose.coverage.kept import made
 from rcsc.compose.exact.circuit import circuit
 from rcsc.compose.exact.export import aiger, btor2
 from rcsc.compose.invariant.cubes import as_condition, shown
@@ -55,6 +57,7 @@ from rcsc.front.commands.shared.proved import (
 )
 from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, wants_color
 from rcsc.front.commands.shared.stopped import say_error
+from rcsc.front.commands.systems.covering import coverage_as_json, lines_of
 from rcsc.front.commands.systems.explained import explanation_as_json, say_exercise, say_explanation
 from rcsc.lang.model import Kind
 from rcsc.proof.solvers.options import Limits
@@ -87,6 +90,7 @@ class Asked:
     strict: bool
     invariants: bool
     as_json: bool
+    coverage: bool = False
 
 
 def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) -> int:
@@ -98,6 +102,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     systems, loaded = read_systems(path)
     sources = {file: source for files in loaded.values() for file, source in files.sources.items()}
     names = _known(asked.only, systems) or tuple(systems)
+    programs = {spec.name: spec.program for spec in description(path).levels}
     length = usual_length(systems.values()) if asked.cycles is None else asked.cycles
     settings = TraceSettings(
         description(path),
@@ -118,10 +123,17 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         _write(asked.certificate, systems, proof)
     if not asked.as_json:
         _say(_lines(path, systems, proof, asked, sources))
+    coverages = {
+        level.level: made(cache, systems[level.level], level, loaded[programs[level.level]])
+        for level in proof.levels
+        if asked.coverage
+    }
+    if not asked.as_json:
+        _say(line for each in coverages.values() for line in lines_of(each, sources))
     explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
         found = [explanation_as_json(systems, explanation, settings) for explanation in explanations]
-        _say(_lines(path, systems, proof, asked, sources, found))
+        _say(_lines(path, systems, proof, asked, sources, found, coverages))
     for agreement in (each for each in proof.agreements if not each.holds):
         say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
@@ -129,7 +141,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         return 3
     status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
     status = max(status, summary(proof).status(strict=asked.strict))
-    if cache is not None and not status and not explanations:
+    if cache is not None and not status and not explanations and not asked.coverage:
         keep_lines(
             cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked, sources)), stood, loaded
         )
@@ -170,15 +182,15 @@ def exported(path: Path, only: tuple[str, ...], form: str, folder: Path) -> int:
     for name in _known(only, systems) or systems:
         ts = systems[name].refusing()
         step = ts.cycle(ts.havoc())
-        made = circuit(ts, tuple(ts.firsts().values()), step, obligations(ts, step))
+        gates = circuit(ts, tuple(ts.firsts().values()), step, obligations(ts, step))
         file = folder / f"{name}.{'aig' if form == 'aiger' else form}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(file, aiger(made) if form == "aiger" else btor2(made))
+            write_atomically(file, aiger(gates) if form == "aiger" else btor2(gates))
         except OSError as error:
             raise UnwritableError(str(folder), error.strerror or "no reason given") from error
-        left_open = f"; left open: {', '.join(made.opened)}" if made.opened else ""
-        click.echo(f"{file}: {len(made.wanted)} obligations, {len(made.latches)} bits of state{left_open}")
+        left_open = f"; left open: {', '.join(gates.opened)}" if gates.opened else ""
+        click.echo(f"{file}: {len(gates.wanted)} obligations, {len(gates.latches)} bits of state{left_open}")
     return 0
 
 
@@ -206,10 +218,11 @@ def _lines(
     asked: Asked,
     sources: Sources,
     findings: Sequence[dict[str, Any]] = (),
+    coverages: Mapping[str, Coverage] | None = None,
 ) -> Iterator[str]:
-    """Yield the lines to print of a proof; findings are part of it as JSON, and else printed by themselves."""
+    """Yield the lines to print of a proof; findings and coverage are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
-        yield json.dumps(_as_json(proof, systems, sources, findings), indent=2)
+        yield json.dumps(_as_json(proof, systems, sources, findings, coverages or {}), indent=2)
         return
     yield summary(proof).line(strict=asked.strict)
     for level_proof in proof.levels:
@@ -428,11 +441,17 @@ def _how(level: LevelProof, key: Key) -> dict[str, str]:
     return {"by": dict(level.by)[key]} if key in dict(level.by) else {}
 
 
+def _coverage(coverage: Coverage | None, sources: Sources) -> dict[str, Any]:
+    """Return what the requirements of a level speak of, where that was asked for."""
+    return {} if coverage is None else {"coverage": coverage_as_json(coverage, sources)}
+
+
 def _as_json(
     proof: SystemProof,
     systems: dict[str, TransitionSystem],
     sources: Sources,
     findings: Sequence[dict[str, Any]],
+    coverages: Mapping[str, Coverage],
 ) -> dict[str, Any]:
     return {
         "proved": proof.proved,
@@ -459,6 +478,7 @@ def _as_json(
                 ],
                 "clauses": len(level.clauses),
                 **as_json(proof, level),
+                **_coverage(coverages.get(level.level), sources),
             }
             for level in proof.levels
         ],
