@@ -1,20 +1,24 @@
 """Cores, slips and offers: against the interpreter on drawn levels, and on a counter of retries whose reset nothing speaks of."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
 
-from rcsc.compose.contract.claims import ACCEPTED
+from rcsc.compose.contract.claims import ACCEPTED, Verdict
+from rcsc.compose.contract.environment import Given
+from rcsc.compose.contract.obligations import obligations
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.coverage.cores import Core, core
+from rcsc.compose.coverage.cores import Core, core, each_needed
 from rcsc.compose.coverage.covered import Coverage, covered, stated
-from rcsc.compose.coverage.parts import How, Use, uses_of
+from rcsc.compose.coverage.offers import notices
+from rcsc.compose.coverage.parts import How, Use, switched, uses_of
 from rcsc.compose.coverage.questions import Questions
-from rcsc.compose.coverage.slips import Fate, environments, judged
-from rcsc.compose.proof.level import prove_level
+from rcsc.compose.coverage.slips import Fate, environments, judged, slips_of
+from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import read_systems, transition_systems
 from rcsc.front.commands import run
 from rcsc.lang.leaves import everything
@@ -158,8 +162,7 @@ def test_cores_of_many_drawn_levels_are_minimal(seed: int) -> None:
     shows_and_nothing_smaller_does(drawn(seed))
 
 
-def test_an_assumption_is_needed_or_is_not() -> None:
-    text = """\
+ASSUMING = """\
 input x : int 0 .. 9
 state n : int 0 .. 9
 assume small assumed : x <= 3
@@ -173,17 +176,72 @@ property low : n <= 3
 property known : n <= 9
 level solo { period 10 [ms] table t }
 """
+
+
+def owed_by_another(text: str) -> TransitionSystem:
+    """Return the level of a text whose assumptions another level owes."""
     ts = alone(text)
+    given = tuple(Given(str(one.name), "x", "other", one.condition) for one in ts.program.assumptions)
+    return replace(ts, links=replace(ts.links, written=(("x", "other", "y"),), given=given))
+
+
+@pytest.mark.parametrize("ts", [alone(ASSUMING), owed_by_another(ASSUMING)], ids=["trusted", "owed"])
+def test_an_assumption_is_needed_or_is_not(ts: TransitionSystem) -> None:
     low, known = found_cores(ts)
-    assert (low.assumptions, leaves(low.uses)) == (("small",), {("one", "n")})
+    assert (low.assumptions, leaves(low.uses), low.minimal) == (("small",), {("one", "n")}, True)
     assert (known.assumptions, known.uses, known.minimal) == ((), (), True)
-    found = covered(ts, prove_level(ts, LITTLE))
-    assert found.assumptions == ("even",)
+    assert covered(ts, prove_level(ts, LITTLE)).assumptions == ("even",)
 
 
 def test_where_fewer_might_do_nothing_is_called_minimal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rcsc.compose.coverage.cores.MOST_TRIED", 0)
     assert not any(one.minimal for one in found_cores(alone(ROBOT)))
+
+
+def test_members_that_another_proof_does_without_are_left_out() -> None:
+    """Two too many to begin with: they go, and of what stays a run shows that it is needed."""
+    ts = alone(ROBOT)
+    [place] = environments(ts, prove_level(ts, LITTLE))
+    asked = Questions(place.ts, place.proof, How.FREE)
+    key = ("property", "", "third_fails")
+    wanted = {("third", "now"), ("start", "tries"), ("idle", "fast")}
+    begun = [one for one in asked.members if isinstance(one, Use) and leaves((one,)) & wanted]
+    members, minimal = each_needed(asked, key, frozenset(begun))
+    assert minimal
+    assert leaves(tuple(one for one in members if isinstance(one, Use))) == {("third", "now")}
+
+
+def test_what_is_written_again_and_again_is_free_each_time() -> None:
+    text = """\
+input x : int 0 .. 3
+state n : array[2] of int 0 .. 3
+procedure set {
+  for i in 0 .. 1 {
+    n[i] := x
+  }
+}
+table t {
+  | line | x || procedures |
+  |------|---||------------|
+  | one  |   || set        |
+}
+property alike : n[0] = n[1]
+level solo { period 10 [ms] table t }
+"""
+    ts = alone(text)
+    [one] = found_cores(ts)
+    assert leaves(one.uses) == {("one", "n[0]"), ("one", "n[1]")}
+    assert one.minimal
+    free = switched(ts.program, ts.level, How.FREE).program
+    assert len(free.variables) - len(ts.program.variables) == 1 + 4  # two elements, each time either
+
+
+def test_what_comes_with_the_protocol_is_no_requirement() -> None:
+    ts = transition_systems(PROTOCOL / "system.toml")["supervisor"]
+    every = tuple((owed, Verdict.PROVED) for owed in obligations(ts, ts.cycle(ts.havoc())))
+    names = {key[2] for key in stated(ts, LevelProof(ts.level.name, every, (), (), 0, 0, 0.0))}
+    assert names == {one.name for one in ts.program.properties if not one.standard}
+    assert any(one.standard for one in ts.program.properties)
 
 
 def test_what_the_protocol_makes_is_no_part_of_a_program() -> None:
@@ -276,6 +334,30 @@ level solo { period 10 [ms] table t }
     assert cells["stays", "lamp"] is Fate.CHANGES_NOTHING
 
 
+def test_a_slip_that_only_a_long_run_shows_is_noticed() -> None:
+    """It comes to the twelfth cycle, later than short runs look; what is left of the invariant does not exclude it."""
+    text = """\
+input go : bool
+state n : int 0 .. 12
+state laps : int 0 .. 1
+property wraps : was n = 12 implies n = 0
+table t {
+  | line  | n    || n     | laps     |
+  |-------|------||-------|----------|
+  | count | < 12 || n + 1 |          |
+  | wrap  | 12   || 0     | 1 - laps |
+}
+level solo { period 10 [ms] table t }
+"""
+    ts = alone(text)
+    fates = {
+        one.slip.uses[0].part.leaves[0]: one.fate
+        for one in judged(environments(ts, prove_level(ts, LITTLE)))
+        if not one.slip.whole_line and one.slip.uses[0].line == "wrap"
+    }
+    assert fates == {"n": Fate.NOTICED, "laps": Fate.SURVIVES}
+
+
 def test_an_invariant_is_no_requirement_and_notices_nevertheless() -> None:
     text = ROBOT.replace("property third_fails", "invariant low : tries <= 2\nproperty third_fails")
     ts = alone(text)
@@ -304,6 +386,40 @@ def test_what_is_offered_is_proved_and_refuted_once_the_slip_is_made(text: str, 
     assert [owed.name for owed in prove_level(wrong, LITTLE).open] == ["begin_sets_tries"]
 
 
+def test_what_is_false_of_the_level_and_what_the_slip_keeps_is_not_offered() -> None:
+    ts = alone(ROBOT)
+    places = environments(ts, prove_level(ts, LITTLE))
+    [reset] = [
+        slip
+        for slip in slips_of(uses_of(ts.program, ts.level))
+        if slip.uses[0].part.leaves == ("tries",)
+        and slip.uses[0].part.procedure == "begin"
+        and not slip.whole_line
+    ]
+    said = (
+        "was now = still implies tries = 0",
+        "now = bad implies not fast",
+        "was now = still and go implies tries = 0",
+    )
+    properties = [alone(f"{ROBOT}property said : {each}\n").program.properties[-1] for each in said]
+    assert [notices(places, reset, one) for one in properties] == [False, False, True]
+
+
+def test_the_manual_says_what_is_found() -> None:
+    page = (Path(__file__).parents[2] / "grammar" / "requirements.md").read_text(encoding="utf-8")
+    section = page.partition("## What no requirement speaks of")[2].partition("\n## ")[0]
+    text = section.partition("```rcs\n")[2].partition("```")[0]
+    _, found = looked_at(text.replace("level l ", "level solo "))
+    [fails] = found.cores
+    assert (leaves(fails.uses), fails.minimal) == ({("third", "now")}, True)
+    assert "`third_fails` needs one assignment, `bad` in line `third`" in section
+    said = {one.text: found.slips[one.slip] for one in found.offers}
+    [offered] = [
+        each for each in said if each.startswith("property begin_sets_tries") and f"`{each}`" in section
+    ]
+    assert said[offered].slip.uses[0].part.leaves == ("tries",)
+
+
 # --- as it is told -----------------------------------------------------------------------------
 
 
@@ -324,6 +440,21 @@ def test_the_command_tells_it_and_keeps_it(tmp_path: Path, capsys: pytest.Captur
     assert {one["fate"] for one in told["slips"]} == {"survives", "noticed"}
     assert run(["prove", str(system), "--json"]) == 0
     assert "coverage" not in json.loads(capsys.readouterr().out)["levels"][0]
+
+
+def test_the_matrix_shows_it_once_it_is_known(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    system = solo_system(tmp_path, ROBOT)
+    asked = ["trace", str(system.with_name("solo.rcs")), "--no-vectors", "--find", "t again"]
+    assert run(["prove", str(system)]) == 0
+    assert run(asked) == 0
+    assert "no requirement speaks" not in capsys.readouterr().out
+    assert run(["prove", str(system), "--coverage"]) == 0
+    assert run(asked) == 0
+    printed = capsys.readouterr().out
+    assert "no requirement speaks of what it writes to tries, fast" in printed
+    assert "without all that it does, everything that is proved of the level still holds" in printed
+    assert run([*asked[:-1], "slow"]) == 0
+    assert "needs 6 assignments, no fewer" in capsys.readouterr().out
 
 
 def test_of_a_level_without_requirements_one_line_is_told(

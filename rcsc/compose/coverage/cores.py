@@ -10,7 +10,7 @@ other members go.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.transition import TransitionSystem
@@ -21,8 +21,10 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import prove_again
 from rcsc.proof.solvers import smt
 
+FINDING = 100_000_000
+"""Steps of Z3 to find one, some minute; then nothing is known of it."""
 STEPS = 15_000_000
-"""Steps of Z3 to make the core of one requirement smaller, some ten seconds; then it is left as it is."""
+"""Steps of Z3 to make it smaller, some ten seconds; then it is left as it is."""
 MOST_TRIED, CYCLES = 60, 6
 """Members of a core that are looked at one by one, and cycles of the runs that are looked for first."""
 
@@ -45,12 +47,13 @@ class Core:
 
 def core(asked: Questions, key: Key) -> Core | None:
     """Return the core of a requirement that is proved; None where Z3 does not show it once more from the invariant."""
-    found = asked.needed(key, asked.members, asked.clauses)
+    with smt.together(FINDING):
+        found = asked.needed(key, asked.members, asked.clauses)
     if found is None:
         return None
     with smt.together(STEPS):
         found = _fewer(asked, key, found)
-    members, minimal = _each_needed(asked, key, found.members)
+    members, minimal = each_needed(asked, key, found.members)
     every = [one for one in asked.members if one in members]
     uses = tuple(one for one in every if isinstance(one, Use))
     return Core(key, uses, tuple(one for one in every if isinstance(one, str)), minimal)
@@ -68,7 +71,7 @@ def _fewer(asked: Questions, key: Key, found: Needed) -> Needed:
     return found
 
 
-def _each_needed(asked: Questions, key: Key, members: frozenset[Member]) -> tuple[frozenset[Member], bool]:
+def each_needed(asked: Questions, key: Key, members: frozenset[Member]) -> tuple[frozenset[Member], bool]:
     """Leave out members without which another proof is found; return whether each of the others is needed."""
     if len(members) > MOST_TRIED:
         return members, False
@@ -102,6 +105,7 @@ def _broken_without(asked: Questions, key: Key, members: frozenset[Member]) -> s
 def with_just(asked: Questions, on: Collection[Member]) -> TransitionSystem:
     """Return the level in which just these members are on."""
     program = switched(asked.ts.program, asked.ts.level, asked.how, lambda use: use in on).program
-    made = with_program(asked.ts, program, asked.ts)
+    given = tuple(fact for fact in asked.ts.links.given if fact.name in on)
+    made = with_program(replace(asked.ts, links=replace(asked.ts.links, given=given)), program, asked.ts)
     made.trusted = frozenset(name for name in made.trusted if name in on)
     return made

@@ -11,6 +11,7 @@ from rcsc.compose.coverage.covered import Coverage, covered
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.level import LevelProof
 from rcsc.lang.project import Loaded
+from rcsc.proof.solvers import smt
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +34,9 @@ def made(cache: Cache | None, ts: TransitionSystem, proof: LevelProof, loaded: L
     kept = None if cache is None else cache.load(_Kept, "coverage", level)
     if kept is not None and kept.texts == texts:
         return kept.coverage
+    cut_before = smt.cut_short()
     found = covered(ts, proof, loaded)
-    if cache is not None:
+    if cache is not None and smt.cut_short() == cut_before:  # else another machine might find something else
         cache.store(_Kept(found, texts), "coverage", level)
     return found
 

@@ -56,13 +56,13 @@ def offer(places: Sequence[Environment], slip: Slip, loaded: Loaded) -> str | No
     for use in slip.uses[:MOST_LINES]:
         for name, condition, response in _forms(place.ts, use):
             text = f"property {name} : {condition} implies {response}"
-            stated = _resolved(text, loaded, name)
-            if stated is not None and _notices(places, slip, stated):
+            stated = resolved(text, loaded, name)
+            if stated is not None and notices(places, slip, stated):
                 return text
     return None
 
 
-def _resolved(text: str, loaded: Loaded, name: str) -> Property | None:
+def resolved(text: str, loaded: Loaded, name: str) -> Property | None:
     """Return a property as the program's own text would have it; None where it is none."""
     root = loaded.roots[0]
     added = f"{loaded.sources[root].text.rstrip()}\n\n{text}\n"
@@ -73,7 +73,7 @@ def _resolved(text: str, loaded: Loaded, name: str) -> Property | None:
     return next((one for one in program.properties if one.name == name), None)
 
 
-def _notices(places: Sequence[Environment], slip: Slip, stated: Property) -> bool:
+def notices(places: Sequence[Environment], slip: Slip, stated: Property) -> bool:
     """Return whether a property is proved of a level, and broken once the slip is made."""
     place = places[-1]  # where no input is refused, if that makes a difference: a run there is one anywhere
     alone = replace(place.ts.program, properties=(stated,))

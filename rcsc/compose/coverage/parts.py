@@ -137,7 +137,12 @@ def of_program(program: Program, level: Level, how: How, off: Iterable[Use]) -> 
 
 @dataclass(slots=True)
 class _Switching:
-    """Puts switches into a program; each call of a procedure runs a copy of its own."""
+    """Puts switches into a program; each call of a procedure runs a copy of its own.
+
+    Attributes:
+        shared: Inputs that stand for what lines of the present table write, by type and number; None outside tables.
+        taken: How many of them the present line has.
+    """
 
     program: Program
     how: How
@@ -147,6 +152,8 @@ class _Switching:
     under: dict[Use, tuple[Expr, ...]] = field(default_factory=dict)
     variables: list[Variable] = field(default_factory=list)
     copies: list[Procedure] = field(default_factory=list)
+    shared: dict[tuple[Scalar, int], str] | None = None
+    taken: Counter[Scalar] = field(default_factory=Counter)
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
 
@@ -159,13 +166,16 @@ class _Switching:
 
     def table(self, table: Table) -> Table:
         """Put switches into each line."""
+        self.shared = {}
         lines = tuple(replace(line, actions=self._actions(table, line)) for line in table.lines)
         default = table.default
         if default is not None:
             default = replace(default, actions=self._actions(table, default))
+        self.shared = None
         return replace(table, lines=lines, default=default)
 
     def _actions(self, table: Table, line: Line | Default) -> tuple[Action, ...]:
+        self.taken.clear()
         where = str(table.name), str(line.name)
         return tuple(replace(one, statement=self._cell(one.statement, where)) for one in line.actions)
 
@@ -268,9 +278,18 @@ class _Switching:
     def _any(self, leaves: Iterable[str]) -> tuple[Statement, ...]:
         kinds = [(VariableName(leaf), self.kinds[leaf]) for leaf in leaves]
         return tuple(
-            Assign(ToLeaf(name, kind), Read(VariableName(self._variable("anything", kind)), kind))
-            for name, kind in kinds
+            Assign(ToLeaf(name, kind), Read(VariableName(self._anything(kind)), kind)) for name, kind in kinds
         )
+
+    def _anything(self, kind: Scalar) -> str:
+        """Return an input that has any value: of a table's lines, of which one runs, each has the same ones."""
+        if self.shared is None:
+            return self._variable("anything", kind)
+        self.taken[kind] += 1
+        key = kind, self.taken[kind]
+        if key not in self.shared:
+            self.shared[key] = self._variable("anything", kind)
+        return self.shared[key]
 
     def _variable(self, word: str, kind: Scalar) -> str:
         name = f"{word} {len(self.variables)}"

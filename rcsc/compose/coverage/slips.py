@@ -23,9 +23,11 @@ from rcsc.compose.proof.level import LevelProof
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.sat import GaveUpError
 
-SHORT, LONGER = 4, 8
+SHORT, LONGER = 4, 6
 """Cycles of the runs that are looked for, at first and of what is then left."""
-MOST_SEARCHED = 8
+TOGETHER = 200_000_000
+"""Steps of Z3 for all slips of a level together, some minutes; later ones are open."""
+MOST_SEARCHED = 4
 """Slips for which an invariant is searched: each may take as long as the proof of the level."""
 FEW_WALKS, STEPS = 4, 200_000_000
 """The walks before such a search, and the steps of Z3 within it."""
@@ -104,21 +106,21 @@ def slips_of(uses: Sequence[Use]) -> Iterator[Slip]:
     yield from (Slip(tuple(every), whole_line=False) for every in by_part.values())
 
 
-def judged(places: Sequence[Environment]) -> Iterator[Judged]:
-    """Judge every slip of a level whose claims are proved in these environments: each line's first, then what is left.
+def judged(places: Sequence[Environment]) -> list[Judged]:
+    """Judge every slip of a level whose claims are proved in these environments.
 
-    A cell of a line that may do nothing at all is told with it.
+    Assignments of procedures come first, then lines, then their cells, but for those of lines that may do nothing at all: they are told
+    with them.
     """
     every = [_Asked(one, Questions(one.ts, one.proof, How.LEFT_OUT)) for one in places]
-    lines, parts = list[Slip](), list[Slip]()
-    for slip in slips_of(list(every[0].asked.made.switches)):
-        (lines if slip.whole_line else parts).append(slip)
+    slips = list(slips_of(list(every[0].asked.made.switches)))
     told = _Judge(every)
-    verdicts = told.of(lines)
-    yield from verdicts
-    silent = {use for one in verdicts if one.fate is Fate.SURVIVES for use in one.slip.uses}
-    left = [slip for slip in parts if slip.uses[0].part.procedure or not silent.issuperset(slip.uses)]
-    yield from told.of(left)
+    with smt.together(TOGETHER):
+        inside = told.of([one for one in slips if not one.whole_line and one.uses[0].part.procedure])
+        lines = told.of([one for one in slips if one.whole_line])
+        silent = {use for one in lines if one.fate is Fate.SURVIVES for use in one.slip.uses}
+        cells = [one for one in slips if not one.whole_line and not one.uses[0].part.procedure]
+        return [*inside, *lines, *told.of([one for one in cells if not silent.issuperset(one.uses)])]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from rcsc.base.host.cache import Cache, cache_of, open_cache
 from rcsc.base.host.files.read import json_of
 from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
+from rcsc.code.testing.figures import counted
 from rcsc.compose.proof.standing import KnownVerdict
 from rcsc.driver.compile import Generated, code_of, files_of, files_of_system, planned, systems_in, tables_in
 from rcsc.driver.outline import known as known_of
@@ -146,13 +147,17 @@ def _matrix(
     settings.progress(f"tracing {program.program.file}")
     [proof] = [proof for proof in project.proofs if proof.proved is program]
     told = [(found.primary.span, f"{found.code.value}: {found.message}") for found in proof.diagnostics]
-    if cache is not None:
-        told += unspoken_of(program.program, cache)
+    properties = {} if cache is None else dict(property_proofs(program.program, cache))
+    coverage = None if cache is None else covered_of(program.program, cache)
+    if coverage is not None:
+        told += _unspoken_of(program.program, coverage)
+        for name, needs in _needs(coverage):
+            properties[name] = f"{properties[name]}; {needs}" if name in properties else needs
     known = ProgramFacts(
         _table_proofs(proof.tables),
         tuple(told),
         whole_vectors(program, settings) if wanted.vectors else None,
-        {} if cache is None else property_proofs(program.program, cache),
+        properties,
         project.loaded.sources,
     )
     return matrix(plan, known)
@@ -176,24 +181,30 @@ def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
     return dict(_known(program, cache)) if program.properties else {}
 
 
-def unspoken_of(program: Program, cache: Cache) -> Iterator[tuple[Span, str]]:
-    """Yield the lines of which no requirement needs anything, or some, as an earlier `rcsc prove --coverage` found, each with its place."""
+def covered_of(program: Program, cache: Cache) -> "Coverage | None":
+    """Return what an earlier `rcsc prove --coverage` found of the level of a program, as it is; None where nobody asked."""
     levels = {one.name: os.path.realpath(one.span.file) for one in program.levels}
     for system in systems_above(program.file) if levels and program.properties else ():
         there = cache_of(Path(system).parent, cache)
         standing = known_of(system, there)
-        if standing is not None:
-            from rcsc.compose.coverage.kept import recalled  # it takes a while, and most are asked without
+        if standing is None:
+            continue
+        from rcsc.compose.coverage.kept import recalled  # it takes a while, and most are asked without
 
-        for level in () if standing is None else standing.outline.levels:
-            coverage = recalled(there, level.content) if levels.get(level.name) == level.file else None
-            if coverage is not None:
-                yield from _unspoken_of(program, coverage)
-        if standing is not None:
-            return
+        here = (one for one in standing.outline.levels if levels.get(one.name) == one.file)
+        return next((found for one in here if (found := recalled(there, one.content)) is not None), None)
+    return None
+
+
+def _needs(coverage: "Coverage") -> Iterator[tuple[str, str]]:
+    """Yield what each requirement needs, by name."""
+    for core in coverage.cores:
+        few = ", no fewer" if core.minimal else ""
+        yield core.key[2], f"needs {counted(len({use.part for use in core.uses}), 'assignment')}{few}"
 
 
 def _unspoken_of(program: Program, coverage: "Coverage") -> Iterator[tuple[Span, str]]:
+    """Yield lines of which no requirement needs all that they write, each with its place."""
     silent = {
         (one.slip.uses[0].table, one.slip.uses[0].line)
         for one in coverage.slips

@@ -32,7 +32,9 @@ def lines_of(coverage: Coverage, sources: Sources) -> Iterator[str]:
     for core in coverage.cores:
         yield from _core(core, sources)
     if coverage.cores:
-        yield from _told("no requirement speaks of", _places(coverage.unneeded, sources))
+        every = len(coverage.cores) == coverage.requirements
+        who = "no requirement" if every else "none of these requirements"
+        yield from _told(f"{who} speaks of", _places(coverage.unneeded, sources))
         yield from _told(
             "assumptions that no requirement needs", (f"`{one}`" for one in coverage.assumptions)
         )
