@@ -676,7 +676,9 @@ class Monitor:
         defined: The state that says whether all truths of the cycle are defined; one that is not is stored as false.
         truths: Conditions on the level's leaves, as in a property; each with the state that takes its truth.
         owes: The condition that what was asked for so far is still to come: it is then broken if no other cycle follows.
+        waits: The same, of what need come in no cycle at all: it is broken where it is so in every cycle from some cycle on.
         asks: The condition that the cycle asked for the response; of what counts, that it begins.
+        still: States that stand still while it waits, in a cycle that takes nothing.
     """
 
     states: tuple[Hidden, ...]
@@ -684,7 +686,9 @@ class Monitor:
     truths: tuple[tuple[VariableName, Expr], ...]
     statements: tuple[Statement, ...]
     owes: Expr
+    waits: Expr
     asks: Expr
+    still: tuple[VariableName, ...] = ()
 
 
 # --- tables --------------------------------------------------------------------------

@@ -87,14 +87,14 @@ level l {{ period 10 [ms] table t }}
     ("says", "code", "message"),
     [
         (
-            "when asked, eventually given",
+            "when asked, at last given",
             "RCS323",
-            "no cycle is too late for `eventually`: what it asks for may always still come",
+            "`at last` without a scope asks for nothing: its interval goes on to the end of the run, and a run need not end",
         ),
         (
-            "only while asked, always given",
+            "only before asked, at last given",
             "RCS323",
-            "no cycle is too late for `always` in `only while`: what it asks for may always still come",
+            "`at last` in `only before` asks for nothing: its interval goes on to the end of the run, and a run need not end",
         ),
         ("within 0 cycles, given", "RCS317", "`0 cycles` is no number of cycles from 1 to 4294967295"),
         (

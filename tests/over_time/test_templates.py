@@ -11,6 +11,7 @@ from rcsc.lang.interpret import holds
 from rcsc.lang.model import Bool, Expr, Monitor, Read, VariableName
 from rcsc.lang.over_time import Past, Requirement, Scope, Timing, Trigger, begun, monitored, stepped
 from rcsc.lang.over_time.past import FALSE
+from tests.over_time import endless
 from tests.over_time.formulas import parsed
 
 DATA = Path(__file__).parents[1] / "data"
@@ -100,6 +101,39 @@ def test_each_monitor_says_after_each_cycle_what_the_published_formula_says(scop
                         for bit, trace in enumerate(traces)
                         if found[bit] != tuple(bool(truth >> bit & 1) for truth in verdicts)
                     ]
+    assert not differ, (len(differ), differ[0])
+
+
+ENDLESS = {
+    (row["scope"], row["condition"], row["timing"]): row["formula"] for row in rows("fret_endless.tsv")
+}
+
+
+def judged_for_ever(monitor: Monitor, kept: Expr, trace: dict[str, list[bool]], back: int) -> bool:
+    """Return whether the requirement holds of an endless trace, whose last cycle is followed by cycle `back`, from 0, again and again."""
+    state, seen = begun(monitor), list[tuple[object, ...]]()
+    at, good, waits = 0, True, list[bool]()
+    while (now := (at, *state.values())) not in seen:
+        seen.append(now)
+        cycle = {name: truths[at] for name, truths in trace.items()}
+        state, kept_here = stepped(monitor, kept, state, {}, cycle)
+        good, at = good and kept_here, at + 1 if at + 1 < len(trace["p"]) else back
+        waits.append(holds(monitor.waits, state))
+    return good and not all(waits[seen.index(now) :])
+
+
+@pytest.mark.parametrize("scope", SCOPES)
+def test_each_monitor_says_of_an_endless_run_what_the_published_formula_says(scope: str) -> None:
+    random = Random(scope)  # noqa: S311  # the same traces each time
+    differ = []
+    for (of, trigger, timing), text in ENDLESS.items():
+        formula = endless.parsed(text)
+        monitor = made(of, trigger, timing, 0)
+        for _ in range(EACH if of == scope else 0):
+            back = random.choice((0, 1, 2, 4))
+            trace = drawn(random, back + random.choice((1, 2, 3, 4)))
+            if judged_for_ever(*monitor, trace, back) != formula(trace, back)[0]:
+                differ.append((trigger, timing, trace, back))
     assert not differ, (len(differ), differ[0])
 
 

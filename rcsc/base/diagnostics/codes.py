@@ -1030,20 +1030,20 @@ class Code(StrEnum):
         }
         level gripper { period 40 [ms] table close }
     """
-    NO_BOUND = """RCS323: a requirement that no cycle breaks
+    NO_BOUND = """RCS323: a requirement about a last cycle that never comes
 
-    What may always still come is broken by no cycle, only by a run that never ends. `eventually` and `at last` say so in a scope that
-    need not end, and `always` and `never` in an `only` scope, which ask for the opposite outside. Say until when.
+    `at last` looks at the last cycle of an interval. Without a scope, in `after` and in `only before` an interval goes on to the end of
+    the run, and a run need not end: no cycle is the last one, and nothing would break the requirement. Say where the interval ends.
 
-        input asked : bool
+        input mode : bool
         output given : bool
-        requirement answered : when asked, eventually given
+        requirement given_at_last : after mode, at last given
 
-    error: no cycle is too late for `eventually`: what it asks for may always still come
+    error: `at last` in `after` asks for nothing: its interval goes on to the end of the run, and a run need not end
 
-        input asked : bool
+        input mode : bool
         output given : bool
-        requirement answered : when asked, within 3 cycles, given
+        requirement given_at_last : while mode, at last given
     """
     GAP = """RCS401: an input that no line matches
 

@@ -74,7 +74,6 @@ BROKEN = {
     Sort.PROPERTY: "property `{}` is broken",
     Sort.REQUIREMENT: "requirement `{}` is broken",
     Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
-    Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
     Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
 }
@@ -137,7 +136,9 @@ class Obligation:
 
 
 def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
-    """List all obligations of a level, those of its tables first."""
+    """List all obligations of a level, those of its tables first; or the one that is asked about (`TransitionSystem.only`)."""
+    if ts.only is not None:
+        return tuple(owed for owed in _stated(ts, cycle) if owed.key == (Sort.REQUIREMENT, "", ts.only))
     return (
         *_tables(cycle),
         *_upward(ts, cycle),

@@ -149,6 +149,12 @@ class Cycle:
         return (*self.seen, self.middle)[0]
 
     @property
+    def idle(self) -> Node:
+        """The condition that an input or a result is refused: that may happen as often as the environment likes, but not for ever."""
+        stopped = values.any_of(at.stopped for at in self.every)
+        return values.either(self.untaken, values.both(self.refused, values.negation(stopped)))
+
+    @property
     def cases(self) -> tuple[Node, ...]:
         """Conditions of which one holds: for each table that it runs, and that none does."""
         none = (self.unmatched,) if self.unmatched is not FALSE else ()
@@ -195,6 +201,7 @@ class TransitionSystem:
         clamped: The inputs that properties look back at and cycles move to the edge: where the level begins anew, none has done so yet.
         refuses: Whether cycles that an input ends are cycles, too, and inputs stand as they came where the level begins anew; else nothing
             is refused or stands outside its range, which is then to be trusted.
+        only: The requirement that alone is owed, by name; None where all is.
     """
 
     program: Program
@@ -202,6 +209,7 @@ class TransitionSystem:
     links: Links
     safety: Safety = Safety()
     refuses: bool = False
+    only: str | None = None
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
     inputs: tuple[str, ...] = field(init=False)
@@ -400,7 +408,8 @@ class TransitionSystem:
         cycle = self._admitted(before, suffix, taken, anew=anew)
         if self.refuses and self.refusable:
             cycle = self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
-        watched = ghosts_after(self.program, before, cycle.after, cycle.refusals(self.inputs, suffix))
+        refusals = cycle.refusals(self.inputs, suffix)
+        watched = ghosts_after(self.program, before, cycle.after, refusals, cycle.idle)
         return replace(cycle, after={**cycle.after, **watched}) if watched else cycle
 
     def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:

@@ -154,8 +154,13 @@ def first_ghosts(program: Program) -> Leaves:
     }
 
 
-def ghosts_after(program: Program, before: Leaves, after: Leaves, refusals: Refusals) -> Leaves:
-    """Return the states of all monitors after a cycle, of which these are the leaves and ghosts before and after."""
+def ghosts_after(
+    program: Program, before: Leaves, after: Leaves, refusals: Refusals, idle: Node = FALSE
+) -> Leaves:
+    """Return the states of all monitors after a cycle, of which these are the leaves and ghosts before and after.
+
+    In a cycle that is `idle`, because something is refused, states that then stand still do so.
+    """
     was = {str(earlier(name)): node for name, node in before.items()}
     ghosts: Leaves = {}
     for _, monitor in monitors(program):
@@ -169,6 +174,11 @@ def ghosts_after(program: Program, before: Leaves, after: Leaves, refusals: Refu
         run.state.leaves[str(monitor.defined)] = defined
         run.execute(monitor.statements)
         ghosts |= {str(state.name): run.leaf(state.name) for state in monitor.states}
+        if monitor.still and idle is not FALSE:
+            waits = values.both(idle, run.evaluate(monitor.waits))
+            ghosts |= {
+                str(name): values.choice(waits, before[str(name)], run.leaf(name)) for name in monitor.still
+            }
     return ghosts
 
 

@@ -17,7 +17,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.applied import Texts
 from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace, supposed
-from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
+from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of, waiting_lasso
 from rcsc.compose.counterexample.pair import followed_together
 from rcsc.compose.counterexample.repair import TRIED_CYCLES, helps, repairs
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
@@ -32,11 +32,13 @@ from rcsc.compose.counterexample.trace import (
     traces,
 )
 from rcsc.compose.exact.played import every_run, further_runs
+from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.level import LevelProof, Verdict
 from rcsc.compose.proof.system import SystemProof
 from rcsc.lang.model import Property
 from rcsc.lang.over_time.past import negation
 from rcsc.proof.procedures.invariants import at_first
+from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.run.description import Description
 
 FURTHER = 40
@@ -176,14 +178,28 @@ def _level(
             ]
             yield from _with_repairs(ts, every_pair, proof, settings, texts)
         else:
-            explanation = _explanation(ts, obligation, results.get(obligation.key))
+            result = results.get(obligation.key) or _waits_for_ever(ts, obligation, settings, gave_up)
+            explanation = _explanation(ts, obligation, result)
             notes = tuple(_as_it_begins(ts, obligation))
             explanation = replace(explanation, notes=notes, gave_up=obligation.key in gave_up)
             yield (
                 replace(explanation, supposed=_supposed(ts, obligation, proof))
-                if obligation.key not in results
+                if result is None
                 else explanation
             )
+
+
+def _waits_for_ever(
+    ts: TransitionSystem, obligation: Obligation, settings: TraceSettings, gave_up: set[ObligationKey]
+) -> Lasso | NotReproducedError | None:
+    """Find a run on which a requirement waits for ever that no cycle breaks."""
+    if obligation.sort is not Sort.REQUIREMENT or obligation.name not in waiting(ts):
+        return None
+    try:
+        return waiting_lasso(ts, obligation.name, settings.searches(str(ts.level.name)))
+    except GaveUpError:
+        gave_up.add(obligation.key)
+        return None
 
 
 def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]:
@@ -298,7 +314,9 @@ def _with_repairs(
         yield replace(explanation, helps=shown, together=together)
 
 
-def _explanation(ts: TransitionSystem, obligation: Obligation, result: TraceResult | None) -> Explanation:
+def _explanation(
+    ts: TransitionSystem, obligation: Obligation, result: TraceResult | Lasso | None
+) -> Explanation:
     level = ts.level.name
     match result:
         case None:
@@ -310,6 +328,10 @@ def _explanation(ts: TransitionSystem, obligation: Obligation, result: TraceResu
                 beside=result.beside or (str(result),),
                 guessed=result.guessed,
                 undefined=result.undefined,
+            )
+        case Lasso():
+            return Explanation(
+                level, obligation, replace(of_trace(ts, obligation, result.trace), lasso=result.first)
             )
         case _:
             return Explanation(level, obligation, of_trace(ts, obligation, result))
@@ -359,9 +381,7 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
         obligation = obligation_of(table)
         match results.get(table):
             case Lasso() as lasso:
-                yield Explanation(
-                    proof.level, obligation, replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
-                )
+                yield _explanation(ts, obligation, lasso)
             case other:
                 found = _explanation(ts, obligation, other)
                 supposed_lap = _supposed_lap(ts, table, proof) if other is None and settings.most else None
@@ -419,6 +439,8 @@ class _Rerun:
         ts = self.systems[finding.level]
         if not self.settings.further or ts.links.above is None or len(finding.levels) > 1:
             return None
+        if finding.lasso and finding.obligation.sort is not Sort.ENDS:
+            return None  # the superior takes nothing of it but what the run shows
         start = self.settings.starts.get(finding.level, {})
         search = TraceSearch(restarted=finding.restarted, legal=finding.legal, start=start)
         return consequences(ts, finding, search, self.settings.further)

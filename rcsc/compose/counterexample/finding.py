@@ -4,7 +4,7 @@ In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 
 from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
@@ -174,13 +174,38 @@ _FAULTS = {
 
 def rows(systems: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
     """Return the time line: a row for each cycle of each level."""
-    where = finding.broken_at, finding.level
-    obligation = replace(finding.obligation, name=str(finding.lasso)) if finding.lasso else finding.obligation
+    said = dict(_said(finding))
     return tuple(
-        _row(systems[name], tick, step, obligation if (tick, name) == where else None)
+        _row(systems[name], tick, step, said.get(tick, "") if name == finding.level else "")
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )
+
+
+def _said(finding: Finding) -> Iterator[tuple[int, str]]:
+    """Yield what is said of ticks: where the obligation is broken, or where a lasso begins and ends."""
+    sort, name, first, last = (
+        finding.obligation.sort,
+        finding.obligation.name,
+        finding.lasso,
+        finding.broken_at,
+    )
+    if not first:
+        yield last, BROKEN.get(sort, "").format(name)
+    elif sort is Sort.ENDS:
+        yield last, f"all is as it was before cycle {first}: so it may go on for ever"
+    else:
+        begins, ends = f"from here on {round_of(finding)}", f"`{name}` waits as it did before cycle {first}"
+        yield first, begins if first < last else f"{ends}; {begins}"
+        if first < last:
+            yield last, ends
+
+
+def round_of(finding: Finding) -> str:
+    """Spell which cycles of a lasso come again and again."""
+    if finding.lasso == finding.broken_at:
+        return f"cycle {finding.lasso} again and again"
+    return f"cycles {finding.lasso} to {finding.broken_at} again and again"
 
 
 def state_of(ts: TransitionSystem, finding: Finding) -> dict[str, str]:
@@ -238,7 +263,7 @@ def _begun(ts: TransitionSystem, step: CycleRun, *, restarted: bool) -> TimeLine
     return TimeLineRow(0, ts.level.name, "", RESTART if restarted else BEGINS, takes, leaves, "")
 
 
-def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:
+def _row(ts: TransitionSystem, tick: int, step: CycleRun, said: str) -> TimeLineRow:
     """Return the row of one cycle, with only the leaves that change."""
     kinds = ts.kinds
     changed = {
@@ -253,7 +278,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
     )
     wrong = [f"assumption `{name}` fails" for name in failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
-    wrong += [BROKEN[broken.sort].format(broken.name)] if broken is not None and broken.sort in BROKEN else []
+    wrong += [said] if said else []
     line = " and ".join(step.matched) or "none"
     before = tuple((stage.table, stage.line) for stage in step.stages)
     return TimeLineRow(

@@ -25,8 +25,9 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.cycle_run import CycleRun, broken, one_cycle
 from rcsc.compose.counterexample.finding import Finding
-from rcsc.compose.counterexample.lasso import lasso_of
+from rcsc.compose.counterexample.lasso import lasso_of, waiting_lasso_of
 from rcsc.compose.counterexample.pair import exchange
+from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Program, Scalar, Value, spell, value_of_text
@@ -301,6 +302,10 @@ def _is_broken(systems: Mapping[str, TransitionSystem], case: FrozenCase, steps:
     if case.obligation.sort is Sort.ENDS:
         return lasso_of(ts, case.obligation.table, steps) is not None
     try:
-        return broken(ts, case.obligation, step)
+        if broken(ts, case.obligation, step):
+            return True
+        if case.obligation.sort is not Sort.REQUIREMENT or case.obligation.name not in waiting(ts):
+            return False
+        return waiting_lasso_of(ts, case.obligation.name, steps) is not None
     except StopIteration as error:
         raise BadCaseError(f"level `{case.level}` has no goal `{case.obligation.shown}`") from error

@@ -1,21 +1,27 @@
-"""Finds the shortest fair lasso on which a command never completes.
+"""Finds the shortest fair lasso on which a command never completes, or a requirement waits for ever.
 
-In: a transition system, tables whose commands are not shown to end. Out: `Lasso`s. A lasso is a row of cycles of one command, unanswered in
-some of them, after which every leaf but the numbers of orders is as before. It is *fair*: each subordinate gets an order in it,
-or has answered in all of its cycles. The interpreter runs what the solver finds, and then the lasso once more: the
+In: a transition system; tables whose commands are not shown to end, or a requirement that is not shown not to wait for ever. Out: `Lasso`s.
+A lasso is a row of cycles after which every leaf but the numbers of orders is as before: of one command, unanswered in some of them; or
+such that the requirement waits in each, and then leaves are enough that it depends on. It is *fair*: each subordinate gets an order in it,
+or has answered in all of its cycles, and nothing is refused. The interpreter runs what the solver finds, and then the lasso once more: the
 second time has to be like the first, with numbers that are as much later.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
-from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
+from rcsc.compose.contract.obligations import Obligation, Sort, command_stays, obligations
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.watched import begin
-from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, as_declared, ran_on
-from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
+from rcsc.compose.counterexample.cycle_run import CycleRun, Given, as_cycle, as_declared, ran_on
+from rcsc.compose.counterexample.trace import USUAL, NotReproducedError, Trace, TraceSearch, Unrolled
+from rcsc.compose.exact.circuit import roots_of
+from rcsc.compose.exact.played import played
+from rcsc.compose.proof.eventually import circuit_of, never_waits, waiting, waits_of
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
+from rcsc.lang.model import Value
 from rcsc.lang.restart import NUMBERS
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
@@ -79,16 +85,20 @@ def comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> No
     ]
     moving = _moving(ts)
     same = [values.equal(first.before[leaf], last.after[leaf]) for leaf in first.before if leaf not in moving]
-    due = []
+    waits = values.any_of(unanswered(ts, cycle) for cycle in cycles)
+    return values.all_of((*goes, waits, *same, *_due(ts, cycles)))
+
+
+def _due(ts: TransitionSystem, cycles: Sequence[Cycle]) -> Iterator[Node]:
+    """Yield the conditions that each subordinate gets an order in the cycles, or has answered in all, and that its echo goes on alike."""
+    first, last = cycles[0], cycles[-1]
     for below in ts.links.below:
         ordered = values.negation(values.equal(first.before[below.number], last.after[below.number]))
-        due.append(values.either(ordered, values.all_of(answered(ts, cycle, below) for cycle in cycles)))
+        yield values.either(ordered, values.all_of(answered(ts, cycle, below) for cycle in cycles))
         before, after = (
             values.equal(leaves[below.echo], leaves[below.number]) for leaves in (first.before, last.after)
         )
-        due.append(values.equal(before, after))
-    waits = values.any_of(unanswered(ts, cycle) for cycle in cycles)
-    return values.all_of((*goes, waits, *same, *due))
+        yield values.equal(before, after)
 
 
 def _moving(ts: TransitionSystem) -> set[str]:
@@ -111,14 +121,20 @@ def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) ->
 
 def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int | None:
     """Return the first cycle, from 1, of the shortest lasso with which the run ends; None if it ends with none."""
+    return _first_of(ts, steps, partial(_is_lasso, ts, table))
+
+
+def _first_of(
+    ts: TransitionSystem, steps: Sequence[CycleRun], is_lasso: Callable[[Sequence[CycleRun]], bool]
+) -> int | None:
     for first in range(len(steps) - 1, 0, -1):
         lasso = steps[first:]
-        if _is_lasso(ts, table, lasso):
+        if is_lasso(lasso):
             again = _again(ts, lasso)
             same = [(cycle_run.table, cycle_run.line) for cycle_run in lasso] == [
                 (cycle_run.table, cycle_run.line) for cycle_run in again
             ]
-            if same and _is_lasso(ts, table, again):
+            if same and is_lasso(again):
                 return first + 1
     return None
 
@@ -126,8 +142,11 @@ def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int
 def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[CycleRun]) -> bool:
     if any(step.fault is not Fault.OK or step.table != table for step in lasso):
         return False
-    round_ = comes_round(ts, table, [as_cycle(ts, step) for step in lasso])
-    return round_.known and bool(round_.low)
+    return _is_true(comes_round(ts, table, [as_cycle(ts, step) for step in lasso]))
+
+
+def _is_true(condition: Node) -> bool:
+    return condition.known and bool(condition.low)
 
 
 def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, ...]:
@@ -144,4 +163,114 @@ def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, .
         )
         for step in lasso
     ]
-    return ran_on(ts, after, given)
+    return ran_on(ts, {**after, **lasso[-1].left}, given)
+
+
+# --- requirements that wait for ever -----------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A requirement that may wait for ever.
+
+    Attributes:
+        ts: The level, which owes that it never waits.
+        leaves: The leaves that this depends on.
+    """
+
+    ts: TransitionSystem
+    owed: Obligation
+    leaves: tuple[str, ...]
+
+    @classmethod
+    def of(cls, ts: TransitionSystem, name: str) -> "_Waiting":
+        """Return it of a level. Raises KeyError: no requirement of this name may wait for ever."""
+        never, owed = never_waits(ts, waiting(ts)[name])
+        return cls(never, owed, roots_of(never.cycle(never.havoc()), [owed])[0])
+
+    def comes_round(self, cycles: Sequence[Cycle]) -> Node:
+        """Return the condition that the cycles are a lasso on which it waits."""
+        first, last = cycles[0], cycles[-1]
+        numbers = {leaf for below in self.ts.links.below for leaf in (below.number, below.echo)}
+        goes = (
+            values.all_of((cycle.contract, cycle.goes_on, values.negation(cycle.refused))) for cycle in cycles
+        )
+        waits = (values.negation(each.holds) for cycle in cycles for each in obligations(self.ts, cycle))
+        same = (
+            values.equal(first.before[leaf], last.after[leaf]) for leaf in self.leaves if leaf not in numbers
+        )
+        return values.all_of((*goes, *waits, *same, *_due(self.ts, cycles)))
+
+    def is_lasso(self, lasso: Sequence[CycleRun]) -> bool:
+        """Return whether cycles that were run are a lasso on which it waits."""
+        if any(step.fault is not Fault.OK for step in lasso):
+            return False
+        return _is_true(self.comes_round([as_cycle(self.ts, step) for step in lasso]))
+
+
+def waiting_lasso(
+    ts: TransitionSystem, name: str, searches: Sequence[TraceSearch]
+) -> Lasso | NotReproducedError | None:
+    """Find the shortest lasso on which a requirement waits for ever.
+
+    Where all states can be searched it may be as long as it has to be, however many cycles are asked for; a short one is shown as simple as
+    it can be.
+
+    Raises:
+        GaveUpError: The solver did not decide.
+    """
+    waits = _Waiting.of(ts, name)
+    begun = any(search.start for search in searches)
+    made = (
+        None if begun or ts.links.below else circuit_of(ts, waiting(ts)[name])
+    )  # it knows nothing of answers
+    found = None if made is None else waits_of(made)
+    if found is not None and found.complete and found.lasso is None:
+        return None
+    run = None if found is None or found.lasso is None else found.lasso.run
+    for search in searches if run is None or len(run.given) <= USUAL else ():
+        if (lasso := _simplest(waits, search)) is not None:
+            return lasso
+    if made is None or run is None:
+        return None
+    there = played(waits.ts, made, run)
+    search = TraceSearch(len(there.taken), restarted=there.restarted, legal=ts.links.above is None)
+    given = [(taken, ()) for taken in there.taken]
+    return _ran_round(waits, there.start, given, search, guessed=bool(there.opened))
+
+
+def _simplest(waits: _Waiting, search: TraceSearch) -> Lasso | NotReproducedError | None:
+    run = Unrolled(waits.ts, search)
+    for _ in range(search.most):
+        run.further()
+        every = (waits.comes_round(run.cycles[start:]) for start in range(1, len(run.cycles)))
+        if run.reaches(wrong := values.any_of(every)):
+            start, given = run.inputs(wrong)
+            return _ran_round(waits, start, given, search, guessed=run.guessed)
+    return None
+
+
+def _ran_round(
+    waits: _Waiting, start: Mapping[str, Value], given: Sequence[Given], search: TraceSearch, *, guessed: bool
+) -> Lasso | NotReproducedError:
+    """Run what was found on the interpreter, and its loop once more."""
+    shown = waits.owed.shown
+    try:
+        begun, *later = ran_on(waits.ts, start, given)
+        steps = replace(begun, anew=search.restarted), *later
+        first = _first_of(waits.ts, steps, waits.is_lasso) if len(steps) == len(given) else None
+    except UNDEFINED:
+        return NotReproducedError(shown, undefined=True)
+    if first is None or not all(as_declared(waits.ts, step) for step in steps):
+        return NotReproducedError(shown, guessed=guessed)
+    return Lasso(Trace(shown, steps, search.restarted, search.legal), first)
+
+
+def waiting_lasso_of(ts: TransitionSystem, name: str, steps: Sequence[CycleRun]) -> int | None:
+    """Return the first cycle, from 1, of the shortest lasso on which a requirement waits, with which the run ends; None if with none.
+
+    Raises:
+        KeyError: No requirement of this name may wait for ever.
+    """
+    waits = _Waiting.of(ts, name)
+    return _first_of(waits.ts, steps, waits.is_lasso)

@@ -60,13 +60,17 @@ class Explored:
     complete: bool = False
 
 
-class _Pass:
+class Pass:
     """A frame that is evaluated for many states at once."""
 
     def __init__(self, circuit: Circuit, frame: Frame) -> None:
         needed = circuit.needed(frame.outputs)
         self.frame = frame
-        self._gates = [(2 * gate, _at(a), _at(b)) for gate, (a, b) in circuit.ands.items() if gate in needed]
+        self._gates = [
+            (2 * gate, at_literal(a), at_literal(b))
+            for gate, (a, b) in circuit.ands.items()
+            if gate in needed
+        ]
         self._latches = circuit.latches
         self._size = 2 * circuit.count + 2
         free = frozenset(circuit.inputs(needed))
@@ -102,7 +106,7 @@ class _Pass:
     def values(self, columns: Mapping[Literal, int], ones: int) -> list[int]:
         """Evaluate every literal, at twice its variable; its opposite stands one higher."""
         values = [0] * self._size
-        values[_at(TRUE)] = ones
+        values[at_literal(TRUE)] = ones
         for variable, column in columns.items():
             values[2 * variable], values[2 * variable + 1] = column, column ^ ones
         for gate, a, b in self._gates:
@@ -123,13 +127,14 @@ class _Pass:
         if not self.frame.after:
             return np.zeros((lanes, 1), np.uint8)
         width = (lanes + 7) // 8
-        columns = b"".join(values[_at(bit)].to_bytes(width, "little") for bit in self.frame.after)
+        columns = b"".join(values[at_literal(bit)].to_bytes(width, "little") for bit in self.frame.after)
         rows = np.frombuffer(columns, np.uint8).reshape(len(self.frame.after), width)
         bits = np.unpackbits(rows, axis=1, bitorder="little")[:, :lanes]
         return np.ascontiguousarray(np.packbits(bits, axis=0, bitorder="little").T)
 
 
-def _at(literal: Literal) -> int:
+def at_literal(literal: Literal) -> int:
+    """Return where the values of a literal stand."""
     return 2 * literal if literal > 0 else 1 - 2 * literal
 
 
@@ -144,15 +149,20 @@ def may_apply(step: Cycle, wanted: Sequence[Obligation]) -> bool:
 
 def applies(circuit: Circuit) -> bool:
     """Return whether what the environment may give in a cycle can be listed."""
-    return all(0 < _Pass(circuit, frame).many <= MOST_GIVEN for frame in (*circuit.firsts, circuit.step))
+    return all(0 < Pass(circuit, frame).many <= MOST_GIVEN for frame in (*circuit.firsts, circuit.step))
 
 
 @dataclass(slots=True)
-class _Search:
-    """One search."""
+class Search:
+    """One search.
+
+    Attributes:
+        step: A later cycle.
+        found: What it has found so far.
+    """
 
     circuit: Circuit
-    step: _Pass
+    step: Pass
     found: Explored = field(default_factory=Explored)
     _from: dict[State, State | None] = field(default_factory=dict)
     _done: int = 0
@@ -164,24 +174,29 @@ class _Search:
 
     def begin(self, number: int, left: set[ObligationKey]) -> list[State]:
         """Run the first cycles of one kind; return the new states after them."""
-        first = _Pass(self.circuit, self.circuit.firsts[number])
+        first = Pass(self.circuit, self.circuit.firsts[number])
         return self._ran(first, first.columns(), [None], left, number)
 
     def further(self, states: Sequence[State], left: set[ObligationKey], number: int) -> list[State]:
         """Run one more cycle from these states; return the new ones."""
-        size = max(1, AT_ONCE // self.step.many)
-        columns, following = self.step.columns(), list[State]()
+        following = list[State]()
+        for part, columns in self.passes(states):
+            following += self._ran(self.step, columns, list(part), left, number)
+        return following
+
+    def passes(self, states: Sequence[State]) -> Iterator[tuple[Sequence[State], dict[Literal, int]]]:
+        """Yield states that go in one pass, and its words of inputs and latches: a lane for each state and all that may be given."""
+        size, columns = max(1, AT_ONCE // self.step.many), self.step.columns()
         for at in range(0, len(states), size):
             part = states[at : at + size]
             whole = sum(1 << self.step.many * place for place in range(len(part)))
             repeated = {variable: column * whole for variable, column in columns.items()}
             repeated.update(self.step.latched(part))
-            following += self._ran(self.step, repeated, list(part), left, number)
-        return following
+            yield part, repeated
 
     def _ran(
         self,
-        ran: _Pass,
+        ran: Pass,
         columns: Mapping[Literal, int],
         starts: Sequence[State | None],
         left: set[ObligationKey],
@@ -190,10 +205,10 @@ class _Search:
         lanes = ran.many * len(starts)
         self._done += lanes
         values = ran.values(columns, (1 << lanes) - 1)
-        valid = values[_at(ran.frame.valid)]
-        on = valid & values[_at(ran.frame.goes_on)]
+        valid = values[at_literal(ran.frame.valid)]
+        on = valid & values[at_literal(ran.frame.goes_on)]
         for key, holds in zip(self.circuit.wanted, ran.frame.holds, strict=True):
-            wrong = (valid if key[0] in EARLY else on) & values[_at(-holds)]
+            wrong = (valid if key[0] in EARLY else on) & values[at_literal(-holds)]
             if wrong and key in left:
                 lane = (wrong & -wrong).bit_length() - 1
                 left.discard(key)
@@ -201,7 +216,7 @@ class _Search:
         return self._new(ran, ran.ends(values, lanes), on, starts)
 
     def _new(
-        self, ran: _Pass, rows: npt.NDArray[np.uint8], on: int, starts: Sequence[State | None]
+        self, ran: Pass, rows: npt.NDArray[np.uint8], on: int, starts: Sequence[State | None]
     ) -> list[State]:
         lanes = len(rows)
         kept = np.unpackbits(
@@ -223,34 +238,51 @@ class _Search:
     # --- runs ---
 
     def _run(self, state: State | None, number: int, wrong: ObligationKey) -> Run:
-        """Return the run that leads over the states found to this cycle, with what the environment gives kept as it was where it can."""
+        """Return the run that leads over the states found to this cycle."""
+        way = self.way(state)
+        return self.run_over((*way, None), (*(None for _ in way[1:]), wrong), number)
+
+    def way(self, state: State | None) -> tuple[State | None, ...]:
+        """Return the states on the shortest way to a state, from None, before the first cycle."""
         states: list[State | None] = [state]
         while (last := states[-1]) is not None:
             states.append(self._from[last])
-        states.reverse()
-        first = _Pass(self.circuit, self.circuit.firsts[number])
+        return tuple(reversed(states))
+
+    def run_over(
+        self, states: Sequence[State | None], breaks: Sequence[ObligationKey | None], number: int
+    ) -> Run:
+        """Return a run from state to state, in which what the environment gives stays as it was where it can.
+
+        Args:
+            states: None before the first cycle; any state after the last where that is None.
+            breaks: For each cycle the obligation that it breaks, if it is to.
+            number: Which of the first frames it begins with.
+        """
+        first = Pass(self.circuit, self.circuit.firsts[number])
         given: list[Mapping[str, int]] = []
         before: Mapping[str, int] = {}
-        for at, start in enumerate(states):
-            ran = first if at == 0 else self.step
-            end = states[at + 1] if at + 1 < len(states) else None
-            lanes = self._lanes(ran, start, end, wrong)
+        for at, wrong in enumerate(breaks):
+            ran = self.step if at else first
+            lanes = self._lanes(ran, states[at], states[at + 1], wrong)
             chosen = max(map(ran.given, lanes), key=lambda one: _alike(ran.frame, one, before))
             given.append(chosen)
             before = by_leaf(ran.frame, chosen)
         return Run(number, tuple(given))
 
-    def _lanes(self, ran: _Pass, start: State | None, end: State | None, wrong: ObligationKey) -> list[int]:
-        """List what the environment may give so that the cycle leads there; or, in the last one, breaks the obligation."""
+    def _lanes(
+        self, ran: Pass, start: State | None, end: State | None, wrong: ObligationKey | None
+    ) -> list[int]:
+        """List what the environment may give so that the cycle leads there, if anywhere, and breaks the obligation, if any."""
         columns = ran.columns()
         if start is not None:
             columns |= ran.latched([start])
         values = ran.values(columns, (1 << ran.many) - 1)
-        right = values[_at(ran.frame.valid)]
-        if end is None:
-            right &= values[_at(-ran.frame.holds[self.circuit.wanted.index(wrong)])]
-        if end is not None or wrong[0] not in EARLY:
-            right &= values[_at(ran.frame.goes_on)]
+        right = values[at_literal(ran.frame.valid)]
+        if wrong is not None:
+            right &= values[at_literal(-ran.frame.holds[self.circuit.wanted.index(wrong)])]
+        if wrong is None or wrong[0] not in EARLY:
+            right &= values[at_literal(ran.frame.goes_on)]
         rows = ran.ends(values, ran.many)
         return [
             lane
@@ -271,7 +303,7 @@ def _alike(frame: Frame, given: Mapping[str, int], before: Mapping[str, int]) ->
 
 def explored(circuit: Circuit) -> Explored:
     """Search all states of a circuit to which this applies, up to an effort that is the same on every machine."""
-    search = _Search(circuit, _Pass(circuit, circuit.step))
+    search = Search(circuit, Pass(circuit, circuit.step))
     left = set(circuit.wanted)
     for number in range(len(circuit.firsts)):
         wave, cycles = search.begin(number, left), 1

@@ -59,6 +59,15 @@ class Unrolled:
         self._inputs.append(of)
         self.cycles += 1
 
+    @property
+    def latches(self) -> tuple[Literal, ...]:
+        """The latches after the last cycle."""
+        return tuple(self._latches)
+
+    def same(self, a: Literal, b: Literal) -> Literal:
+        """Return the literal that two others are the same."""
+        return self._both(-self._both(a, -b), -self._both(-a, b))
+
     def given(self) -> list[dict[str, int]]:
         """Return what the environment gives in each cycle of the last model, by variable."""
         every = []

@@ -31,7 +31,7 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.obligations import Obligation, Sort, asks, resting_table
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.proof.level import LevelProof
+from rcsc.compose.proof.level import Bound, LevelProof
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.leaves import root_of
 from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, NUMBERS
@@ -70,7 +70,9 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
     for obligation, verdict in proof.verdicts:
-        if obligation.key != SAFE:
+        if (bound := proof.bound(obligation.key)) is not None:
+            yield obligation.key, _of_bound(ts, proof, bound)
+        elif obligation.key != SAFE:
             yield obligation.key, Claim(verdict, runs, _trusted(ts, proof, obligation))
     if proof.context is not None:
         trusts = admitted(ts) if proof.looked_admitting else ()
@@ -151,22 +153,40 @@ def _of_ending(ts: TransitionSystem, ending: Ending, *, admitting: bool) -> Clai
     trusts = [
         f"`{other.name}` comes to rest some time where it is told to, and stays so"
         if other.answers_in_time
-        else f"`{other.name}` answers every order that is not replaced, and stays so"
+        else _ANSWERS.format(other.name)
         for other in below
         if other.outside
     ]
     trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in ending.still]
-    if asks(ts.program):
-        trusts.append(f"extern procedures of level `{name}` are {NOT_FOR_EVER}")
-    if admitting:
-        trusts += admitted(ts)
-    elif ts.refusable:
-        trusts.append(not_for_ever(ts))
+    trusts += _goes_on(ts, admitting=admitting)
     needs = tuple(
         (other.name, RESTING if other.answers_in_time else ENDING) for other in below if not other.outside
     )
     stand = tuple((other.name, STANDS) for other in below if other.report in ending.settled)
     return Claim(verdict, ((name, RUNS), *needs, *stand), tuple(trusts))
+
+
+_ANSWERS = "`{}` answers every order that is not replaced, and stays so"
+
+
+def _goes_on(ts: TransitionSystem, *, admitting: bool) -> Iterator[str]:
+    """Yield the assumptions about refusals of a claim that something comes: none is for ever, or none is at all."""
+    if asks(ts.program):
+        yield f"extern procedures of level `{ts.level.name}` are {NOT_FOR_EVER}"
+    if admitting:
+        yield from admitted(ts)
+    elif ts.refusable:
+        yield not_for_ever(ts)
+
+
+def _of_bound(ts: TransitionSystem, proof: LevelProof, bound: Bound) -> Claim:
+    """Claim that a requirement never waits for ever: where a round is one of orders and answers, assuming that these come."""
+    name, below = ts.level.name, ts.links.below if bound.within.fair else ()
+    asked = [other for other in below if not other.answers_in_time]
+    trusts = [_ANSWERS.format(other.name) for other in asked if other.outside]
+    needs = ((other.name, ENDING) for other in asked if not other.outside)
+    admitting = bound.admitting or proof.needs_admission((Sort.REQUIREMENT, "", bound.name))
+    return Claim(Verdict.PROVED, ((name, RUNS), *needs), (*trusts, *_goes_on(ts, admitting=admitting)))
 
 
 # --- what levels assume of each other ------------------------------------------------------

@@ -32,7 +32,9 @@ from rcsc.compose.invariant.search import (
 )
 from rcsc.compose.proof.candidates import Candidates, candidates, content, keep_candidates
 from rcsc.compose.proof.context import Context, context, never_asked, never_run
+from rcsc.compose.proof.eventually import Try, bounded_by, may_be_listed, tries, waiting
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
+from rcsc.lang.model import Property
 from rcsc.proof.solvers import smt
 from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.sat import GaveUpError
@@ -43,6 +45,8 @@ from rcsc.proof.symbolic.values import TRUE
 
 TOGETHER = 50
 """All questions about a level together may take the steps of so many; later ones are not decided."""
+BOUND_WALKS = 4
+"""Walks for one obligation alone."""
 TRIES = (64, 64, 16, 16, 4, 1)
 """What part of its steps a question of the confirmation gets, try after try: what one search gives up another often refutes at once."""
 
@@ -70,6 +74,7 @@ class LevelProof:
         by: How obligations were proved that the search over predicates leaves open, in words.
         conditions: Those that exact engines found, of which the last predicates are made.
         exact: Whether it is confirmed only of terms in which all arithmetic of integers is exact (`keyed.ExactIntegers`).
+        bounds: For how long each requirement that may wait for ever does so at most, of those proved.
     """
 
     level: str
@@ -88,9 +93,17 @@ class LevelProof:
     by: tuple[tuple[Key, str], ...] = ()
     conditions: tuple[Found, ...] = ()
     exact: bool = False
+    bounds: "tuple[Bound, ...]" = ()
+
+    def bound(self, key: Key) -> "Bound | None":
+        """Return the bound by which a requirement that may wait for ever is proved; None for any other obligation."""
+        named = (bound for bound in self.bounds if (Sort.REQUIREMENT, "", bound.name) == key)
+        return next(named, None)
 
     def needs_admission(self, key: Key) -> bool:
         """Return whether an obligation is proved only if no input is refused."""
+        if (bound := self.bound(key)) is not None and bound.admitting:
+            return True
         here, refusing = (
             [verdict for owed, verdict in one.verdicts if owed.key == key]
             for one in (self, *(self.parts[:1] or (self,)))
@@ -128,12 +141,94 @@ class LevelProof:
         return tuple(obligation for obligation, verdict in self.verdicts if verdict not in ACCEPTED)
 
 
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A requirement that waits for no more than so many rounds in a row, proved.
+
+    Attributes:
+        name: The requirement's.
+        within: The bound.
+        admitting: Whether it is proved only if no input is refused.
+        proof: The proof of that one obligation (`eventually.bounded_by`).
+    """
+
+    name: str
+    within: Try
+    admitting: bool
+    proof: LevelProof
+
+    @property
+    def how(self) -> str:
+        """How it was proved, in words."""
+        most, fair = self.within.most, self.within.fair
+        round_ = "round of orders and answers" if fair else "cycle"
+        waits = "never waits" if not most else f"waits for {most} {round_}{'s' * (most > 1)} at most"
+        return ", ".join((waits, *(by for _, by in self.proof.by)))
+
+
 def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
     """Prove a level whose inputs may be refused; prove the open obligations once more as if none were.
 
+    A requirement that may wait for ever is proved only if it is proved besides that it does not.
+    """
+    effort = effort or Effort()
+    proof = _in_each_cycle(ts, effort, cache)
+    begun = time.perf_counter()
+    wanted = (
+        stated
+        for name, stated in waiting(ts).items()
+        if proof.verdict(Sort.REQUIREMENT, "", name) in ACCEPTED
+    )
+    every = tuple(bound for stated in wanted if (bound := _bound(ts, proof, stated, effort)) is not None)
+    proof = bounded_proof(ts, proof, every)
+    return replace(proof, seconds=proof.seconds + time.perf_counter() - begun)
+
+
+def bounded_proof(ts: TransitionSystem, proof: LevelProof, bounds: tuple[Bound, ...]) -> LevelProof:
+    """Return the proof with these bounds: requirements that may wait for ever, and have none, are not proved."""
+    names = {bound.name for bound in bounds}
+    unbounded = {(Sort.REQUIREMENT, "", name) for name in waiting(ts) if name not in names}
+    verdicts = tuple(
+        (owed, Verdict.NOT_PROVED if owed.key in unbounded and verdict in ACCEPTED else verdict)
+        for owed, verdict in proof.verdicts
+    )
+    how: dict[Key, str] = {(Sort.REQUIREMENT, "", bound.name): bound.how for bound in bounds}
+    return replace(proof, verdicts=verdicts, bounds=bounds, by=tuple({**dict(proof.by), **how}.items()))
+
+
+def _bound(ts: TransitionSystem, proof: LevelProof, stated: Property, effort: Effort) -> Bound | None:
+    """Prove a bound for a requirement: with refusals, if it is proved with these in each cycle; else without."""
+    wanted, refusing = list(tries(ts, stated)), ts.refusing()
+    if refusing.refuses and wanted and not proof.needs_admission((Sort.REQUIREMENT, "", stated.name)):
+        # what a refused cycle asks for may take longer
+        for within in (*wanted, replace(wanted[-1], most=2 * wanted[-1].most + 1, exact=False)):
+            if (shown := _proved_bound(refusing, stated, within, effort)) is not None:
+                return Bound(stated.name, within, admitting=False, proof=shown)
+    for within in wanted:
+        if (shown := _proved_bound(ts, stated, within, effort)) is not None:
+            return Bound(stated.name, within, admitting=refusing.refuses, proof=shown)
+    return None
+
+
+def _proved_bound(ts: TransitionSystem, stated: Property, within: Try, effort: Effort) -> LevelProof | None:
+    """Return the proof that a requirement is kept within a bound; None where it is not proved."""
+    bounded = bounded_by(ts, stated, within)
+    effort = replace(effort, walks=min(effort.walks, BOUND_WALKS), looks=False)
+    listed = within.exact and may_be_listed(bounded)
+    for searches in (False, True) if listed else (True,):
+        walked = begin(bounded, (), effort) if searches else FoundInvariant()
+        shown = _proved(bounded, effort, None, walked, Candidates(), searches=searches)
+        if not shown.open:
+            return without_nodes(shown)
+    return None
+
+
+def _in_each_cycle(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:
+    """Prove what a cycle can break.
+
     An invariant with refusals is one without: the second search begins with the first one's.
     """
-    effort, refusing = effort or Effort(), ts.refusing()
+    refusing = ts.refusing()
     if not refusing.refuses:
         return _proved_of(ts, effort, cache, begin(ts, (), effort))
     walked = begin(ts, (), effort)  # of cycles that take their inputs: the same in both
@@ -248,7 +343,10 @@ def _proved(
     walked: FoundInvariant,
     known: Candidates,
     refusing: _Refusing | None = None,
+    *,
+    searches: bool = True,
 ) -> LevelProof:
+    """Prove a level in one environment; without a search over predicates exact engines do what they can."""
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, cycle)
@@ -257,7 +355,9 @@ def _proved(
             before = None if refusing is None else _begun(ts, cycle, wanted, refusing)
             from_here = before or FoundInvariant(open=frozenset(range(len(wanted))))
             from_here = replace(from_here, states=walked.states, ran=walked.ran)
-            found = search(ts, firsts, cycle, wanted, effort, known.clauses, from_here)
+            found = (
+                search(ts, firsts, cycle, wanted, effort, known.clauses, from_here) if searches else from_here
+            )
             keep_candidates(cache, ts, found, known)
             posed = _Posed(
                 ts, firsts, cycle, wanted, effort, refusing, () if before is None else before.clauses
@@ -542,7 +642,7 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     it; `goals first`, `goals restart`: such cycles fulfil the obligations that are proved; `goals SORT`: every cycle from the
     invariant fulfils those of one sort; `lines N`: the lines in their context; `ends TABLE N`: no step is taken that was not
     found, counters rise, and there is no other loop; `stands N`: the report stands once it has answered. What needs that no
-    input is refused has questions of its own, `nothing refused ...`.
+    input is refused has questions of its own, `nothing refused ...`; so has for how long a requirement waits, `requirement NAME ...`.
     If lines or endings, asked again, differ from the proof, one question has a model.
     """
     if proof.parts:
@@ -551,8 +651,14 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
         left = tuple((owed, verdict) for owed, verdict in admitting.verdicts if owed.key not in aside)
         scripts = _certificate(ts.refusing(), refusing, limits)
         others = _certificate(ts, replace(admitting, verdicts=left), limits)
-        return scripts | {f"nothing refused {name}": text for name, text in others.items()}
-    return _certificate(ts.refusing(), proof, limits)
+        scripts |= {f"nothing refused {name}": text for name, text in others.items()}
+    else:
+        scripts = _certificate(ts.refusing(), proof, limits)
+    for bound in proof.bounds:
+        bounded = bounded_by(ts if bound.admitting else ts.refusing(), waiting(ts)[bound.name], bound.within)
+        others = _certificate(bounded, bound.proof, limits)
+        scripts |= {f"requirement {bound.name} {name}": text for name, text in others.items()}
+    return scripts
 
 
 def _certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits) -> dict[str, str]:

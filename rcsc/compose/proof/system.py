@@ -29,7 +29,16 @@ from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import agreements, claims, of_level, other_end
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import Context
-from rcsc.compose.proof.level import LevelProof, Verdict, joined, prove_level, without_nodes
+from rcsc.compose.proof.eventually import Try, bounded_by, waiting
+from rcsc.compose.proof.level import (
+    Bound,
+    LevelProof,
+    Verdict,
+    bounded_proof,
+    joined,
+    prove_level,
+    without_nodes,
+)
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.meaning import with_stops
@@ -333,6 +342,17 @@ class _Kept:
     by: tuple[tuple[Key, str], ...] = ()
     conditions: tuple[Found, ...] = ()
     exact: bool = False
+    bounds: "tuple[_KeptBound, ...]" = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _KeptBound:
+    """A bound as it is kept."""
+
+    name: str
+    within: Try
+    admitting: bool
+    proof: _Kept
 
 
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
@@ -345,13 +365,28 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
 
 
 def _whole(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
-    """Return the proof with its parts: with refusals, where there are any, and without."""
-    if not kept.parts:
-        return _recalled(ts.refusing(), kept)
-    with_refusals, without = (
-        _recalled(each, part) for each, part in zip((ts.refusing(), ts), kept.parts, strict=True)
-    )
-    return None if with_refusals is None or without is None else joined(with_refusals, without)
+    """Return the proof with its parts: with refusals, where there are any, and without; and with its bounds."""
+    if kept.parts:
+        with_refusals, without = (
+            _recalled(each, part) for each, part in zip((ts.refusing(), ts), kept.parts, strict=True)
+        )
+        proof = None if with_refusals is None or without is None else joined(with_refusals, without)
+    else:
+        proof = _recalled(ts.refusing(), kept)
+    bounds = [bound for one in kept.bounds if (bound := _recalled_bound(ts, one)) is not None]
+    if proof is None or len(bounds) < len(kept.bounds):
+        return None
+    return bounded_proof(ts, proof, tuple(bounds))
+
+
+def _recalled_bound(ts: TransitionSystem, kept: _KeptBound) -> Bound | None:
+    """Return a bound, if it is of the level as it is."""
+    stated = waiting(ts).get(kept.name)
+    if stated is None:
+        return None
+    bounded = bounded_by(ts if kept.admitting else ts.refusing(), stated, kept.within)
+    proof = _recalled(bounded, kept.proof)
+    return None if proof is None else Bound(kept.name, kept.within, kept.admitting, without_nodes(proof))
 
 
 def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
@@ -360,9 +395,10 @@ def _recalled(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
     wanted = obligations(ts, cycle)
     if [obligation.key for obligation in wanted] != [key for key, _ in kept.verdicts]:
         return None
-    for closely in range(CLOSELY + 1):
-        chosen = every_predicate(ts, cycle, read(cycle, wanted), closely)
-        chosen += tuple(predicate(found, ts.kinds) for found in kept.conditions)
+    every = (every_predicate(ts, cycle, read(cycle, wanted), closely) for closely in range(CLOSELY + 1))
+    said = tuple(predicate(found, ts.kinds) for found in kept.conditions)
+    for begun in ((), *every):
+        chosen = (*begun, *said)
         if tuple(predicate.name for predicate in chosen) == kept.predicates:
             verdicts = tuple(
                 (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
@@ -389,6 +425,7 @@ def _kept(proof: LevelProof) -> _Kept:
         tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
         proof.context, proof.endings, proof.unstated, proof.stands, tuple(map(_kept, proof.parts)),
         proof.by, proof.conditions, proof.exact,
+        tuple(_KeptBound(bound.name, bound.within, bound.admitting, _kept(bound.proof)) for bound in proof.bounds),
     )  # fmt: skip
 
 

@@ -2,8 +2,9 @@
 
 A *requirement* has a *scope* (in which cycles it applies), a *trigger* (which of these ask for something), a *timing* (when it has to
 come) and a *response* (what has to hold). The scope cuts a run into *intervals*, each judged by itself. A *monitor* looks at each cycle
-once, keeps a few truth values and bounded counters, and tells in which cycle the requirement is broken. No other requirement is left: all
-that is said of time is a condition on one cycle and these states, so that whoever proves a property, or watches one, does it as ever.
+once, keeps a few truth values and bounded counters, and tells in which cycle the requirement is broken. So what is said of time is a
+condition on one cycle and these states, and whoever proves a property, or watches one, does it as ever. One thing no cycle breaks: that
+something comes *eventually*. Of that a monitor tells in which cycles it waits; in every cycle from some cycle on it is never to do so.
 
 >>> from rcsc.lang.model import Bool, Read, VariableName
 >>> from rcsc.lang.over_time import Past, Requirement, Timing, Trigger, begun, monitored, stepped
@@ -27,9 +28,20 @@ Modules, in the order the data flows: `past` (what conditions remember), `requir
 statements), `run` (a monitor over a run).
 """
 
-from rcsc.lang.over_time.monitor import monitored
+from rcsc.lang.over_time.monitor import bounded, monitored
 from rcsc.lang.over_time.past import Past
 from rcsc.lang.over_time.requirement import Requirement, Scope, Timing, Trigger
 from rcsc.lang.over_time.run import Watch, begun, stepped
 
-__all__ = ["Past", "Requirement", "Scope", "Timing", "Trigger", "Watch", "begun", "monitored", "stepped"]
+__all__ = [
+    "Past",
+    "Requirement",
+    "Scope",
+    "Timing",
+    "Trigger",
+    "Watch",
+    "begun",
+    "bounded",
+    "monitored",
+    "stepped",
+]

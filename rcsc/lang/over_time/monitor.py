@@ -1,8 +1,9 @@
 """A requirement as a deterministic monitor, in the language's own statements.
 
-In: a requirement. Out: its `Monitor`, and the condition that a cycle keeps it. Three parts follow each other in each cycle: whether the
-cycle is in the scope, whether it asks for the response, and what the timing makes of both. An interval ends in the cycle before the one
-that is not in the scope: so what is wrong with its last cycle is told a cycle later, and by `owes` at the end of a run.
+In: a requirement. Out: its `Monitor`, and the condition that a cycle keeps it; for a proof, both with a bound. Three parts follow each
+other in each cycle: whether the cycle is in the scope, whether it asks for the response, and what the timing makes of both. An interval
+ends in the cycle before the one that is not in the scope: so what is wrong with its last cycle is told a cycle later, and by `owes` at the
+end of a run. An interval without end has no last cycle: of a run without end it is `waits` that tells what never comes.
 
 Outside its scope an `only` requirement is the dual timing of the negated response: not (P for T) is (not P) within T, and so on. Only
 *exactly after* has no dual among the timings.
@@ -11,11 +12,11 @@ Source of the meaning: the interval semantics of FRET, as its manual and its for
 (https://github.com/NASA-SW-VnV/fret, release 3.1, `fret-electron/app/parser/semantics.json`).
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from rcsc.lang.model import Bool, Expr, If, Int, Monitor, Statement
+from rcsc.lang.model import Apply, Bool, Expr, If, Int, Monitor, Op, Property, Statement
 from rcsc.lang.over_time.past import FALSE, TRUE, Past, State, both, either, negation, number
 from rcsc.lang.over_time.requirement import STOPPED, Requirement, Scope, Timing, Trigger
 
@@ -52,10 +53,47 @@ def monitored(past: Past, required: Requirement) -> tuple[Monitor, Expr]:
     broken, owes = made.timing(required, in_scope, asks)
     if required.scope is Scope.BETWEEN:
         broken, owes = made.once_ended(in_scope, broken), FALSE
+    waits = FALSE if required.timing is Timing.AT_LAST else owes
     monitor = Monitor(
-        tuple(made.states), defined.name, tuple(made.truths), tuple(made.statements), owes, made.asks
+        tuple(made.states), defined.name, tuple(made.truths), tuple(made.statements), owes, waits, made.asks
     )
     return monitor, both(defined.now, negation(broken))
+
+
+def bounded(stated: Property, most: int, fair: Sequence[Expr] = ()) -> Property:
+    """Return the requirement that is broken, too, where it waits for more than so many rounds in a row.
+
+    A round is a cycle; or, of `fair` conditions, cycles in which each of them has held. So where it waits for ever, and each of these holds
+    again and again, there are more rounds than any number: what is bounded comes. In a cycle that takes nothing no round goes on.
+
+    Source: Claessen and Sorensson, "A liveness checking algorithm that counts", 2012.
+    """
+    monitor = stated.monitor
+    assert monitor is not None
+    made = Past(stated.name, list(monitor.states), list(monitor.truths), list(monitor.statements))
+    held = [_stored(made, condition) for condition in fair]
+    seen = [made.state("seen fair", Bool(), initial=False) for _ in fair]
+    over = both(*(either(now, before.was) for now, before in zip(held, seen, strict=True)))
+    for now, before in zip(held, seen, strict=True):
+        made.statements.append(before.set(both(monitor.waits, negation(over), either(now, before.was))))
+    rounds = made.state("rounds", Int(0, most + 1), 0)
+    stays, counts = (rounds.set(rounds.was),), (rounds.counted(1),)
+    more = If(both(over, rounds.was_from(0, most)), counts, stays)
+    made.statements.append(If(monitor.waits, (more,), (rounds.set(number(0)),)))
+    watch = replace(
+        monitor,
+        states=tuple(made.states),
+        truths=tuple(made.truths),
+        statements=tuple(made.statements),
+        still=(rounds.name, *(state.name for state in seen)),
+    )
+    enough = Apply(Op.LE, (rounds.now, number(most)), Bool())
+    return replace(stated, condition=both(stated.condition, enough), monitor=watch)
+
+
+def _stored(made: Past, condition: Expr) -> Expr:
+    """Add the state that takes the truth of a fair condition; return what it is after the cycle."""
+    return made.truth("fair", lambda _: condition).now
 
 
 # --- a monitor in the making -----------------------------------------------------------------

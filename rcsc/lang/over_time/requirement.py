@@ -38,6 +38,10 @@ class Scope(StrEnum):
         return self.value.startswith("only")
 
 
+ENDLESS = frozenset({Scope.ALL, Scope.AFTER, Scope.ONLY_BEFORE})
+"""Scopes of which an interval ends with the run alone."""
+
+
 class Trigger(StrEnum):
     """The cycles of an interval that ask for the response; the value is its word.
 

@@ -154,10 +154,10 @@ def _requirement(scope: Scope, written: tree.RequirementDecl) -> Property | None
     scope.past = None
     if required is None or not _remembers(scope, written, required):
         return None
-    watch, kept = monitor.monitored(remembered, required)
-    if watch.owes != past.FALSE:
-        _without_bound(scope, written)
+    if required.timing is requirement.Timing.AT_LAST and required.scope in requirement.ENDLESS:
+        _without_end(scope, written)
         return None
+    watch, kept = monitor.monitored(remembered, required)
     name, doc, text = written.name, " ".join(written.doc), spell_required(written)
     named = requirements(scope, written.requirements)
     return Property(
@@ -230,9 +230,9 @@ def _remembers(scope: Scope, written: tree.RequirementDecl, required: requiremen
     return False
 
 
-def _without_bound(scope: Scope, written: tree.RequirementDecl) -> None:
-    """Report a requirement that no cycle breaks, only the end of a run."""
-    what = f"`{written.timing}` in `{written.scope}`" if written.scope else f"`{written.timing}`"
-    message = f"no cycle is too late for {what}: what it asks for may always still come"
-    helps = "say until when: `within TIME,`, or `before CONDITION,`"
+def _without_end(scope: Scope, written: tree.RequirementDecl) -> None:
+    """Report a requirement about the last cycle of intervals that have none: nothing breaks it."""
+    what = f"`at last` in `{written.scope}`" if written.scope else "`at last` without a scope"
+    message = f"{what} asks for nothing: its interval goes on to the end of the run, and a run need not end"
+    helps = "say where it ends: `while CONDITION,`, `before CONDITION,` or `between CONDITION and CONDITION,`"
     scope.report(Code.NO_BOUND, message, written.name.span, helps)

@@ -24,6 +24,7 @@ from rcsc.compose.counterexample.finding import (
     beginnings,
     by_tick,
     lap_of,
+    round_of,
     rows,
     state_of,
 )
@@ -192,11 +193,11 @@ def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanati
         run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
     elif not in_c:
         run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
-    what = (
-        f"goes round from cycle {finding.lasso} to the end of cycle {finding.broken_at}"
-        if finding.lasso
-        else f"broken in cycle {finding.broken_at}"
-    )
+    what = f"broken in cycle {finding.broken_at}"
+    if finding.lasso and explanation.warns:
+        what = f"goes round from cycle {finding.lasso} to the end of cycle {finding.broken_at}"
+    elif finding.lasso:
+        what = f"waits for ever, {round_of(finding)}"
     alone = f" of level `{finding.level}` alone" if explanation.supposes else ""
     attach("note", f"{what}{alone}{begins}, {run_by}{legal}")
     if explanation.supposes:

@@ -1,0 +1,136 @@
+"""What eventually comes: the bounds within which a level may be proved to answer, to be tried in order.
+
+In: a level, and a requirement that may wait (`Monitor.waits`). Out: `Try`s, the likeliest first; none where a run waits for ever. A level
+that waits for no more than so many rounds in a row never waits for ever: that is an obligation on one cycle (`over_time.bounded`), which
+is proved and confirmed as others are. Where states end there is such a bound, or a run on which it waits for ever.
+
+What is assumed besides the contract, and named in the verdict: that inputs and results of extern procedures are not refused for ever; a
+cycle that refuses one counts for nothing. That subordinates answer, as for termination: each order, unless another replaces it. Then a
+round is over when each has been given an order, or has answered. Nothing else: an input may stay away for ever. A restart ends what is
+waited for, so that restarts need not come to an end.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from rcsc.compose.contract.environment import Below
+from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.watched import monitors
+from rcsc.compose.exact import explicit
+from rcsc.compose.exact.circuit import Circuit, circuit
+from rcsc.compose.exact.eventual import Waits, of_all_states, of_short_runs
+from rcsc.lang.model import Apply, Bool, Enum, Expr, Literal, Op, Property, Read, VariableName, earlier
+from rcsc.lang.over_time import bounded
+from rcsc.lang.over_time.past import FALSE, both, either, negation
+
+DOUBLED = 3
+"""How often a bound that is not proved is doubled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Try:
+    """A bound to try.
+
+    Attributes:
+        most: The rounds.
+        fair: Whether a round is over only when each subordinate has been given an order, or has answered; else it is a cycle.
+        exact: Whether all states were searched for it.
+    """
+
+    most: int
+    fair: bool = False
+    exact: bool = False
+
+
+def waiting(ts: TransitionSystem) -> dict[str, Property]:
+    """Return the requirements that may wait for ever, by name."""
+    return {stated.name: stated for stated, monitor in monitors(ts.program) if monitor.waits != FALSE}
+
+
+def tries(ts: TransitionSystem, stated: Property) -> Iterator[Try]:
+    """Yield the bounds to try; none where a run without refusals is found that waits for ever."""
+    made = circuit_of(ts, stated)
+    found = None if made is None else waits_of(made)
+    if made is not None and found is not None and (found.lasso is None or made.opened):
+        if found.complete and found.lasso is None:
+            yield Try(found.most, exact=True)
+            return
+        # what waits as long as a run was looked at has no bound that anything speaks for
+        if found.most < found.cycles or not ts.links.below:
+            yield from (Try(found.most << times) for times in range(DOUBLED))
+    if ts.links.below:
+        yield from (Try(1 << times, fair=True) for times in range(DOUBLED))
+
+
+def waits_of(made: Circuit) -> Waits:
+    """Return for how long a requirement waits: of all states, or else of short runs."""
+    return of_all_states(made) or of_short_runs(made)
+
+
+def circuit_of(ts: TransitionSystem, stated: Property) -> Circuit | None:
+    """Return the circuit of the obligation that the requirement never waits; None where extern procedures are called."""
+    never, owed = never_waits(ts, stated)
+    step, firsts = never.cycle(never.havoc()), tuple(never.firsts().values())
+    if any(cycle.calls for cycle in (*firsts, step)):
+        return None  # what an extern procedure gives is no input
+    return circuit(never, firsts, step, [owed])
+
+
+def never_waits(ts: TransitionSystem, stated: Property) -> tuple[TransitionSystem, Obligation]:
+    """Return the level with the obligation that a requirement waits in no cycle."""
+    assert stated.monitor is not None
+    calm = replace(stated, condition=negation(stated.monitor.waits))
+    never = _with(ts.admitting(), calm)
+    [owed] = obligations(never, never.cycle(never.havoc()))
+    return never, owed
+
+
+def bounded_by(ts: TransitionSystem, stated: Property, bound: Try) -> TransitionSystem:
+    """Return the level with the obligation that the requirement is kept within the bound."""
+    fair = tuple(ended_or_ordered(ts, below) for below in ts.links.below) if bound.fair else ()
+    return _with(ts, bounded(stated, bound.most, fair))
+
+
+def _with(ts: TransitionSystem, stated: Property) -> TransitionSystem:
+    """Return the level that owes nothing but this requirement."""
+    properties = tuple(stated if one.name == stated.name else one for one in ts.program.properties)
+    return replace(ts.of(replace(ts.program, properties=properties)), only=stated.name)
+
+
+def ended_or_ordered(ts: TransitionSystem, below: Below) -> Expr:
+    """Return the condition that a cycle gives the subordinate an order, or takes the answer to the last one (`termination.answered`).
+
+    Of a subordinate that answers in time nothing is assumed: each cycle is such a one.
+    """
+    if below.answers_in_time:
+        return Literal(value=True, type=Bool())
+    number, number_was = _read(ts, below.number), _read(ts, below.number, was=True)
+    first = _equal(_read(ts, below.command, was=True), Literal(0, ts.kinds[below.command]))
+    done, failed = (_says(ts, below.status, said) for said in (below.done, below.failed))
+    ended = either(done, both(negation(first), failed))
+    return either(
+        negation(_equal(number, number_was)), both(_equal(_read(ts, below.echo), number_was), ended)
+    )
+
+
+def _says(ts: TransitionSystem, leaf: str, member: str) -> Expr:
+    kind = ts.kinds[leaf]
+    if not isinstance(kind, Enum) or member not in kind.members:
+        return FALSE
+    return _equal(_read(ts, leaf), Literal(kind.members.index(member), kind))
+
+
+def _equal(left: Expr, right: Expr) -> Expr:
+    return Apply(Op.EQ, (left, right), Bool())
+
+
+def _read(ts: TransitionSystem, leaf: str, *, was: bool = False) -> Expr:
+    name = VariableName(leaf)
+    return Read(earlier(name) if was else name, ts.kinds[leaf])
+
+
+def may_be_listed(ts: TransitionSystem) -> bool:
+    """Return whether what the environment may give in a cycle of the level can be listed."""
+    step = ts.cycle(ts.havoc())
+    return not step.calls and explicit.may_apply(step, obligations(ts, step))
