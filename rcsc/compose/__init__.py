@@ -13,8 +13,9 @@ What is proved of each level, alone in its environment (`proof.level`):
   numbers, and numbers come one after the other;
 - of a level by hand, that *done* and *failed* stay (others state it as properties): no proof of a neighbour takes it for granted.
 
-Context: lines that are never reached, what a line does when it matches again (`proof.context`), states that nothing leaves
-(`proof.stuck`). Termination: every command is answered if subordinates answer theirs (`proof.termination`, `proof.ranking`).
+Context: lines that are never reached, what a line does when it matches again (`proof.context`), states that nothing leaves (`proof.stuck`).
+Termination: every command is answered if subordinates answer theirs (`proof.termination`, `proof.ranking`). What requirements ask for
+eventually comes (`proof.eventually`).
 
 What a level assumes of its environment is the contract (`transition`):
 
@@ -54,6 +55,9 @@ Further assumptions:
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is shown in turn
   of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there had been none,
   from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
+- That something comes *eventually* assumes of refusals and answers the same, and nothing else: no input comes by itself, and a restart
+  ends what is waited for. It is shown as a bound on the cycles in a row in which its monitor waits (`proof.eventually`); a cycle that is
+  refused is not counted, and leaves the count as it is.
 - *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means, which are only listed.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import product
 from random import Random
 from typing import TypeAlias
+from unittest.mock import patch
 
 import pytest
 
@@ -13,9 +14,11 @@ from rcsc.compose.contract.watched import begin
 from rcsc.compose.counterexample.cycle_run import broken, one_cycle
 from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso
 from rcsc.compose.counterexample.trace import TraceSearch
+from rcsc.compose.exact.eventual import of_short_runs
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.eventually import waiting
-from rcsc.compose.proof.level import Verdict, prove_level
+from rcsc.compose.proof import eventually
+from rcsc.compose.proof.eventually import Try, waiting
+from rcsc.compose.proof.level import Verdict, prove_level, proved_bound
 from rcsc.lang.interpret import holds, initial
 from rcsc.lang.model import Value
 from tests.support.programs.systems import alone
@@ -158,11 +161,76 @@ def check(seed: int) -> str:
 
 
 def test_what_eventually_comes_is_proved_and_what_never_does_is_shown() -> None:
-    kinds = [check(seed) for seed in range(40)]
+    kinds = [check(seed) for seed in range(14)]
     assert {"proved", "for ever", "broken"} <= set(kinds)
 
 
+QUICK = Effort(walks=1, cycles=10, looks=False)
+
+
+def bounds(seed: int) -> str:
+    """Try bounds that are too small, and states that only seem to move one way, of a drawn level; return what it was."""
+    ts = alone(drawn(seed))
+    if not waiting(ts):
+        return "safe"
+    true, stated, said = truth(ts), waiting(ts)["wanted"], (seed, ts.program.properties[0].text)
+    if true.broken:
+        return "broken"
+    if true.for_ever:
+        every = [Try(3), *(Try(1, rank="n", rises=rises) for rises in (True, False))]
+        assert not any(proved_bound(ts, stated, within, QUICK) for within in every), said
+        return "for ever"
+    assert proved_bound(ts, stated, Try(true.most), QUICK) is not None, said
+    if not true.most:
+        return "at once"
+    assert proved_bound(ts, stated, Try(true.most - 1), QUICK) is None, said
+    return "later"
+
+
+def test_nothing_less_than_the_least_bound_is_proved() -> None:
+    kinds = [bounds(seed) for seed in range(30, 55)]
+    assert {"for ever", "at once", "later"} <= set(kinds)
+
+
+def unlisted(seed: int) -> str:
+    """Compare what is found where states are not listed with the truth; return what it was."""
+    ts = alone(drawn(seed))
+    if not waiting(ts):
+        return "safe"
+    true, said = truth(ts), (seed, ts.program.properties[0].text)
+    with patch.object(eventually, "of_all_states", lambda _: None):
+        proof = prove_level(ts, Effort(walks=2, cycles=20, looks=False))
+        made = eventually.circuit_of(ts, waiting(ts)["wanted"])
+        assert made is not None
+        short = of_short_runs(made)
+    assert (short.lasso is not None) == true.for_ever, said  # the levels are so small that short runs are all
+    assert true.for_ever or short.most == true.most, said
+    if proof.verdict(*wanted_of(ts)) is not Verdict.PROVED:
+        return "open"
+    assert not true.broken, said
+    assert not true.for_ever, said
+    [bound] = proof.bounds
+    return "by a rank" if bound.within.rank else "by a bound"
+
+
+def test_where_states_are_not_listed_bounds_are_tried() -> None:
+    kinds = [unlisted(seed) for seed in range(10)]
+    assert {"open", "by a bound"} <= set(kinds)
+
+
 @pytest.mark.thorough
-@pytest.mark.parametrize("seed", range(40, 1000))
+@pytest.mark.parametrize("seed", range(200))
+def test_of_many_levels_nothing_less_than_the_least_bound_is_proved(seed: int) -> None:
+    bounds(seed)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(10, 300))
+def test_of_many_levels_that_are_not_listed_nothing_false_is_proved(seed: int) -> None:
+    unlisted(seed)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(14, 500))
 def test_of_many_levels_what_eventually_comes_is_proved(seed: int) -> None:
     check(seed)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
+from random import Random
 from typing import Any
 from unittest.mock import patch
 
@@ -24,16 +25,16 @@ from rcsc.compose.exact.bounded import Looked, looked
 from rcsc.compose.exact.circuit import Circuit, Frame, Gates, circuit
 from rcsc.compose.exact.explicit import Explored
 from rcsc.compose.exact.export import aiger, btor2
-from rcsc.compose.exact.said import boxes, of_formula, predicate
+from rcsc.compose.exact.said import boxes, of_formula, of_states, predicate
 from rcsc.compose.exact.spacer import Lemmas, related
 from rcsc.compose.invariant.search import search
 from rcsc.compose.proof.level import Verdict, certificate, prove_level
 from rcsc.compose.proof.system import transition_systems
 from rcsc.front.commands import run
 from rcsc.lang.interpret import holds
-from rcsc.lang.model import Enum, Int, Scalar, key_bounds, value_of_key
+from rcsc.lang.model import Bool, Enum, Int, Scalar, key_bounds, value_of_key
 from rcsc.lang.operator_table import Arithmetic, Op, divide
-from rcsc.proof.solvers.horn import AtMost
+from rcsc.proof.solvers.horn import AtMost, Formula, Joined, Within
 from rcsc.proof.solvers.smt import Answer
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.bits import TRUE
@@ -527,3 +528,38 @@ def played_as_btor2(
         elif kind == "bad":
             bad = bad or bool(read(rest[0]))
     return bad, after
+
+
+def said_of(formula: Formula, state: tuple[int, ...]) -> bool:
+    """Whether a formula holds of the keys of leaves."""
+    match formula:
+        case Joined(every, parts):
+            return (all if every else any)(said_of(part, state) for part in parts)
+        case Within(at, low, high):
+            return low <= state[at] <= high
+        case AtMost(factors, most, equal=True):
+            return sum(state[at] * factor for at, factor in factors) == most
+        case _:
+            raise AssertionError(formula)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_numbers_that_go_together_are_said_as_rows(seed: int) -> None:
+    """Drawn rows of states: what is said of them holds of these, and of no other."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    kinds = (Int(-2, 6), Bool(), Int(0, 7), Int(-8, 1))
+    every = list(product(range(-2, 7), (0, 1), range(8), range(-8, 2)))
+    states = set[tuple[int, ...]]()
+    for _ in range(4):
+        begun, steps = random.choice(every), [random.choice((-1, 0, 1)) for _ in range(4)]
+        way = (tuple(key + step * at for key, step in zip(begun, steps, strict=True)) for at in range(8))
+        states |= {state for state in way if state in set(every)}
+    said = of_states(sorted(states), kinds)
+    assert {state for state in every if said_of(said, state)} == states
+
+
+def test_a_long_row_is_said_in_one_condition() -> None:
+    said = of_states([(at, at + 3) for at in range(100)], (Int(0, 200), Int(0, 200)))
+    assert said == Joined(
+        False, (Joined(True, (Within(0, 0, 99), Within(1, 3, 102), AtMost(((0, 1), (1, -1)), -3, True))),)
+    )

@@ -11,6 +11,7 @@ import pytest
 from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.contract.watched import monitors
+from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import Verdict, prove_level
@@ -21,6 +22,8 @@ from tests.support.programs.systems import alone
 
 PAGE = (Path(__file__).parents[2] / "grammar" / "requirements.md").read_text(encoding="utf-8")
 DRAWING = re.compile(r"^```cycles\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
+MOST_STATES = 40
+"""What comes again and again is run more often than a monitor of a drawing has states."""
 NAMES = ("mode", "asked", "stop", "given")
 PROGRAM = (
     "".join(f"input {name} : bool\n" for name in NAMES)
@@ -47,7 +50,7 @@ def drawings() -> Iterator[tuple[str, dict[str, str], str]]:
             if row is not None:
                 rows[row[1]] = row[2].replace(" ", "")
             else:
-                said = re.fullmatch(r"(.+?) +(kept|broken in cycle \d+)", line)
+                said = re.fullmatch(r"(.+?) +(kept|broken in cycle \d+|waits for ever)", line)
                 assert said is not None, line
                 yield said[1].strip(), dict(rows), said[2]
 
@@ -60,9 +63,17 @@ def test_each_drawing_ends_as_it_says(says: str, rows: dict[str, str], ends: str
         {name: rows.get(name, "........")[at] == "#" for name in NAMES}
         for at in range(len(next(iter(rows.values()))))
     ]
-    watch = Watch(stated)
-    good = [watch.keeps(before, after) for before, after in pairwise([dict.fromkeys(NAMES, False), *cycles])]
-    assert ends == ("kept" if all(good) else f"broken in cycle {good.index(False) + 1}")
+    again = cycles[rows["again"].index("#") :] if "again" in rows else []
+    cycles += again * MOST_STATES
+    watch, waits = Watch(stated), list[bool]()
+    good = []
+    for before, after in pairwise([dict.fromkeys(NAMES, False), *cycles]):
+        good.append(watch.keeps(before, after))
+        assert stated.monitor is not None
+        waits.append(holds(stated.monitor.waits, watch.state))
+    for_ever = again and all(waits[-len(again) :])
+    kept = "waits for ever" if for_ever else "kept"
+    assert ends == (kept if all(good) else f"broken in cycle {good.index(False) + 1}")
 
 
 def test_every_timing_and_scope_is_drawn() -> None:
@@ -84,16 +95,19 @@ EXAMPLE = re.search(r"^```rcs\n(?P<text>.*?)^```$", PAGE, re.MULTILINE | re.DOTA
 assert EXAMPLE is not None
 SAID = dict(
     re.findall(
-        r"^requirement (\w+) : .*?# (proved|vacuous|refuted in cycle \d+)$", EXAMPLE["text"], re.MULTILINE
+        r"^requirement (\w+) : .*?# (proved|vacuous|refuted in cycle \d+|refuted, for ever from cycle \d+ on)$",
+        EXAMPLE["text"],
+        re.MULTILINE,
     )
 )
+FOR_EVER = {name: int(said.split()[-2]) for name, said in SAID.items() if said.endswith("on")}
 
 
 def test_each_example_is_proved_refuted_or_vacuous_as_it_says() -> None:
     assert EXAMPLE is not None
     ts = alone(EXAMPLE["text"])
     assert {one.name for one in ts.program.properties} == SAID.keys()
-    assert {said.split()[0] for said in SAID.values()} == {"proved", "refuted", "vacuous"}
+    assert {said.split()[0].strip(",") for said in SAID.values()} == {"proved", "refuted", "vacuous"}
     proof = prove_level(ts, Effort(walks=6, cycles=40))
     proved = {
         owed.name
@@ -105,8 +119,12 @@ def test_each_example_is_proved_refuted_or_vacuous_as_it_says() -> None:
     found = traces(ts, wanted, TraceSearch(8))
     cycles = {key[2]: len(trace.steps) for key, trace in found.items() if isinstance(trace, Trace)}
     assert cycles == {
-        name: int(said.split()[-1]) for name, said in SAID.items() if said.startswith("refuted")
+        name: int(said.split()[-1]) for name, said in SAID.items() if said.startswith("refuted in")
     }
+    lassos = {name: waiting_lasso(ts, name, [TraceSearch(8)]) for name in FOR_EVER}
+    first = {name: lasso.first for name, lasso in lassos.items() if isinstance(lasso, Lasso)}
+    assert FOR_EVER
+    assert first == FOR_EVER
     assert proof.context is not None
     assert proof.context.vacuous == tuple(name for name, said in SAID.items() if said == "vacuous")
 

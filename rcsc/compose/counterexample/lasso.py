@@ -20,8 +20,8 @@ from rcsc.compose.exact.circuit import roots_of
 from rcsc.compose.exact.played import played
 from rcsc.compose.proof.eventually import circuit_of, never_waits, waiting, waits_of
 from rcsc.compose.proof.termination import answered, unanswered
-from rcsc.lang.interpret import UNDEFINED, Fault
-from rcsc.lang.model import Value
+from rcsc.lang.interpret import UNDEFINED, Fault, holds
+from rcsc.lang.model import Expr, Value
 from rcsc.lang.restart import NUMBERS
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
@@ -175,37 +175,53 @@ class _Waiting:
 
     Attributes:
         ts: The level, which owes that it never waits.
+        waits: The condition that it waits, on the states of its monitor.
         leaves: The leaves that this depends on.
     """
 
     ts: TransitionSystem
     owed: Obligation
+    waits: Expr
     leaves: tuple[str, ...]
 
     @classmethod
     def of(cls, ts: TransitionSystem, name: str) -> "_Waiting":
         """Return it of a level. Raises KeyError: no requirement of this name may wait for ever."""
-        never, owed = never_waits(ts, waiting(ts)[name])
-        return cls(never, owed, roots_of(never.cycle(never.havoc()), [owed])[0])
+        stated = waiting(ts)[name]
+        assert stated.monitor is not None
+        never, owed = never_waits(ts, stated)
+        return cls(never, owed, stated.monitor.waits, roots_of(never.cycle(never.havoc()), [owed])[0])
+
+    @property
+    def numbers(self) -> frozenset[str]:
+        """The numbers of orders, and their echoes, which go on."""
+        return frozenset(leaf for below in self.ts.links.below for leaf in (below.number, below.echo))
 
     def comes_round(self, cycles: Sequence[Cycle]) -> Node:
         """Return the condition that the cycles are a lasso on which it waits."""
         first, last = cycles[0], cycles[-1]
-        numbers = {leaf for below in self.ts.links.below for leaf in (below.number, below.echo)}
         goes = (
             values.all_of((cycle.contract, cycle.goes_on, values.negation(cycle.refused))) for cycle in cycles
         )
         waits = (values.negation(each.holds) for cycle in cycles for each in obligations(self.ts, cycle))
         same = (
-            values.equal(first.before[leaf], last.after[leaf]) for leaf in self.leaves if leaf not in numbers
+            values.equal(first.before[leaf], last.after[leaf])
+            for leaf in self.leaves
+            if leaf not in self.numbers
         )
         return values.all_of((*goes, *waits, *same, *_due(self.ts, cycles)))
 
     def is_lasso(self, lasso: Sequence[CycleRun]) -> bool:
-        """Return whether cycles that were run are a lasso on which it waits."""
-        if any(step.fault is not Fault.OK for step in lasso):
+        """Return whether cycles that were run are a lasso on which it waits: on values, which is quick where it is long."""
+        begins, ends = ({**lasso[0].before, **lasso[0].found}, {**lasso[-1].after, **lasso[-1].left})
+        if any(begins.get(leaf) != ends.get(leaf) for leaf in self.leaves if leaf not in self.numbers):
             return False
-        return _is_true(self.comes_round([as_cycle(self.ts, step) for step in lasso]))
+        if not all(step.fault is Fault.OK and holds(self.waits, step.left) for step in lasso):
+            return False
+        below = self.ts.links.below
+        return not below or _is_true(
+            values.all_of(_due(self.ts, [as_cycle(self.ts, step) for step in lasso]))
+        )
 
 
 def waiting_lasso(

@@ -7,6 +7,7 @@ answer questions about that, or about the same nodes as integers:
 |---|---|---|
 | `explicit` | search of all states, many at once in the bits of words | the shortest run, of thousands of cycles; or all states |
 | `bounded` | cycles one after the other as clauses (`unrolled`) | the shortest run |
+| `eventual` | the same search, and the same cycles | for how long a requirement waits; the shortest run on which it does for ever |
 | `spacer` | Spacer, on integers (`solvers.horn`) | conditions on states that no cycle leaves |
 
 `portfolio` is their face for proofs: cheapest first, budgets in steps. What an engine finds is said as conditions on leaves (`said`),

@@ -5,6 +5,7 @@ In: leaves with their types, and what is known of their keys. Out: expressions, 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from rcsc.code.testing.inputs.condition_text import words
 from rcsc.compose.contract.predicates import Predicate
@@ -31,6 +32,8 @@ from rcsc.proof.solvers.horn import AtMost, Formula, Holds, Joined, Not, Unreada
 Leaf = tuple[str, Scalar]
 Box = tuple[tuple[int, int], ...]
 """Of each leaf the least and the greatest key."""
+FEW_BOXES, SHORTEST_ROW = 8, 4
+"""So few boxes are said as they are; the states that are a row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,13 +197,80 @@ def _applied(op: Arithmetic, left: Expr, right: Expr) -> Expr:
 
 
 def of_states(states: Sequence[Sequence[int]], kinds: Sequence[Scalar]) -> Formula:
-    """Say that the keys of leaves of these types are those of one of the states."""
-    whole = [key_bounds(kind) for kind in kinds]
-    told = [
-        Joined(True, tuple(Within(at, *ends) for at, ends in enumerate(box) if ends != whole[at]))
-        for box in boxes(states)
-    ]
-    return Joined(False, tuple(told))
+    """Say that the keys of leaves of these types are those of one of the states: in boxes, and where numbers go together, in rows."""
+    whole, left = [key_bounds(kind) for kind in kinds], boxes(states)
+    told: list[Formula] = []
+    numbers = [at for at, kind in enumerate(kinds) if isinstance(kind, Int)]
+    for pair in combinations(numbers, 2):
+        if len(left) < FEW_BOXES:
+            break
+        left, found = rows(left, *pair)
+        told += [Joined(True, (*_within(row.ends, whole), row.formula(pair))) for row in found]
+    return Joined(False, (*told, *(Joined(True, _within(box, whole)) for box in left)))
+
+
+def _within(box: Box, whole: Sequence[tuple[int, int]]) -> tuple[Formula, ...]:
+    return tuple(Within(at, *ends) for at, ends in enumerate(box) if ends != whole[at])
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """States in which two numbers go up together, or one up as the other goes down.
+
+    Attributes:
+        ends: The least box with all of them.
+        rises: Whether they go up together.
+    """
+
+    ends: Box
+    rises: bool
+
+    def formula(self, pair: tuple[int, int]) -> Formula:
+        """Say how the two go together."""
+        first, second = pair
+        sign = -1 if self.rises else 1
+        sum_ = self.ends[first][0] + sign * (self.ends[second][0] if self.rises else self.ends[second][1])
+        return AtMost(((first, 1), (second, sign)), sum_, equal=True)
+
+
+def rows(found: Sequence[Box], first: int, second: int) -> tuple[list[Box], list[Row]]:
+    """Return the boxes that are in no row of two numbers by these places, and the rows."""
+    left, rows_ = list[Box](), list[Row]()
+    points: dict[Box, list[Box]] = {}
+    for box in found:
+        if any(low < high for low, high in (box[first], box[second])):
+            left.append(box)
+            continue
+        same = tuple(ends for at, ends in enumerate(box) if at not in (first, second))
+        points.setdefault(same, []).append(box)
+    for alike in points.values():
+        others, rising = _runs(alike, first, second, 1)
+        rest, falling = _runs(others, first, second, -1)
+        rows_ += [_row(run, first, second, rises=True) for run in rising]
+        rows_ += [_row(run, first, second, rises=False) for run in falling]
+        left += rest
+    return sorted(left), rows_
+
+
+def _runs(alike: Sequence[Box], first: int, second: int, step: int) -> tuple[list[Box], list[list[Box]]]:
+    """Split points: those in no row, and rows in which the second number makes this step as the first goes up by one."""
+    runs: dict[tuple[int, int], list[Box]] = {}
+    last: dict[int, tuple[int, int]] = {}
+    for box in sorted(alike, key=lambda box: box[first]):
+        at, row = box[first][0], box[second][0] - step * box[first][0]
+        begun, before = last.get(row, (at, at))
+        last[row] = (begun if at <= before + 1 else at), at
+        runs.setdefault((row, last[row][0]), []).append(box)
+    short = [box for run in runs.values() if len(run) < SHORTEST_ROW for box in run]
+    return short, [run for run in runs.values() if len(run) >= SHORTEST_ROW]
+
+
+def _row(run: Sequence[Box], first: int, second: int, *, rises: bool) -> Row:
+    ends = list(run[0])
+    for at in (first, second):
+        keys = [box[at][0] for box in run]
+        ends[at] = min(keys), max(keys)
+    return Row(tuple(ends), rises)
 
 
 def boxes(states: Sequence[Sequence[int]]) -> list[Box]:

@@ -12,20 +12,43 @@ waited for, so that restarts need not come to an end.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
+from random import Random
 
 from rcsc.compose.contract.environment import Below
-from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.obligations import Obligation, asks, obligations
+from rcsc.compose.contract.predicates import cone
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.walk import Walk
 from rcsc.compose.contract.watched import monitors
 from rcsc.compose.exact import explicit
 from rcsc.compose.exact.circuit import Circuit, circuit
 from rcsc.compose.exact.eventual import Waits, of_all_states, of_short_runs
-from rcsc.lang.model import Apply, Bool, Enum, Expr, Literal, Op, Property, Read, VariableName, earlier
-from rcsc.lang.over_time import bounded
+from rcsc.lang.model import (
+    Apply,
+    Bool,
+    Enum,
+    Expr,
+    Int,
+    Kind,
+    Literal,
+    Op,
+    Property,
+    Read,
+    VariableName,
+    earlier,
+)
+from rcsc.lang.over_time import Rank, bounded
 from rcsc.lang.over_time.past import FALSE, both, either, negation
 
 DOUBLED = 3
 """How often a bound that is not proved is doubled."""
+ROUNDS = (1, 4)
+"""Rounds of orders and answers."""
+RANKED = (0, 1, 4)
+"""For how many cycles in a row a rank may stand."""
+WALKS, WALK = 6, 40
+"""Walks on which a rank is looked at, and their cycles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +59,24 @@ class Try:
         most: The rounds.
         fair: Whether a round is over only when each subordinate has been given an order, or has answered; else it is a cycle.
         exact: Whether all states were searched for it.
+        rank: A state that moves one way alone meanwhile; rounds in which it moves do not count. Empty for none.
+        rises: Whether it rises, and does not fall.
     """
 
     most: int
     fair: bool = False
     exact: bool = False
+    rank: str = ""
+    rises: bool = True
+
+    @property
+    def shown(self) -> str:
+        """For how long it waits, in words."""
+        if not self.most and not self.rank:
+            return "never waits"
+        round_ = "round of orders and answers" if self.fair else "cycle"
+        moves = f" in which `{self.rank}` does not {'rise' if self.rises else 'fall'}" if self.rank else ""
+        return f"waits for {self.most or 'no'} {round_}{'s' * (self.most > 1)}{' at most' * (self.most > 0)}{moves}"
 
 
 def waiting(ts: TransitionSystem) -> dict[str, Property]:
@@ -55,12 +91,38 @@ def tries(ts: TransitionSystem, stated: Property) -> Iterator[Try]:
     if made is not None and found is not None and (found.lasso is None or made.opened):
         if found.complete and found.lasso is None:
             yield Try(found.most, exact=True)
-            return
-        # what waits as long as a run was looked at has no bound that anything speaks for
-        if found.most < found.cycles or not ts.links.below:
+        elif (
+            found.most < found.cycles
+        ):  # what waits as long as a run was looked at has no bound that anything speaks for
             yield from (Try(found.most << times) for times in range(DOUBLED))
+        yield from _ranks(ts, stated)
     if ts.links.below:
-        yield from (Try(1 << times, fair=True) for times in range(DOUBLED))
+        yield from (Try(most, fair=True) for most in ROUNDS)
+
+
+def _ranks(ts: TransitionSystem, stated: Property) -> Iterator[Try]:
+    """Yield the states that may be a rank: on walks each moves one way alone while the requirement waits, at least now and then."""
+    if asks(ts.program):
+        return  # a cycle that refuses a result leaves states as far as it came
+    never, owed = never_waits(ts, stated)
+    inside = cone(never.cycle(never.havoc()), [owed.holds])
+    for variable in ts.program.variables:
+        name = str(variable.name)
+        if variable.kind is Kind.STATE and isinstance(variable.type, Int) and name in inside:
+            for rises, most in product((True, False), RANKED):
+                within = Try(most, rank=name, rises=rises)
+                if _stands_on_walks(bounded_by(ts, stated, within), most):
+                    yield within
+                    break
+
+
+def _stands_on_walks(bounded: TransitionSystem, most: int) -> bool:
+    """Return whether no walk breaks the bound."""
+    rounds = next(
+        monitor.still[0] for stated, monitor in monitors(bounded.program) if stated.name == bounded.only
+    )
+    walks = (Walk(bounded, Random(seed)).states(WALK) for seed in range(WALKS))  # noqa: S311  # the same walks each time
+    return all(state[rounds] <= most for walk in walks for state in walk)
 
 
 def waits_of(made: Circuit) -> Waits:
@@ -89,7 +151,13 @@ def never_waits(ts: TransitionSystem, stated: Property) -> tuple[TransitionSyste
 def bounded_by(ts: TransitionSystem, stated: Property, bound: Try) -> TransitionSystem:
     """Return the level with the obligation that the requirement is kept within the bound."""
     fair = tuple(ended_or_ordered(ts, below) for below in ts.links.below) if bound.fair else ()
-    return _with(ts, bounded(stated, bound.most, fair))
+    rank = None if not bound.rank else _rank(ts, bound.rank, rises=bound.rises)
+    return _with(ts, bounded(stated, bound.most, fair, rank))
+
+
+def _rank(ts: TransitionSystem, leaf: str, *, rises: bool) -> Rank:
+    more, less = (Apply(op, (_read(ts, leaf), _read(ts, leaf, was=True)), Bool()) for op in (Op.GT, Op.LT))
+    return Rank(more, less) if rises else Rank(less, more)
 
 
 def _with(ts: TransitionSystem, stated: Property) -> TransitionSystem:

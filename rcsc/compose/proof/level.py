@@ -160,10 +160,7 @@ class Bound:
     @property
     def how(self) -> str:
         """How it was proved, in words."""
-        most, fair = self.within.most, self.within.fair
-        round_ = "round of orders and answers" if fair else "cycle"
-        waits = "never waits" if not most else f"waits for {most} {round_}{'s' * (most > 1)} at most"
-        return ", ".join((waits, *(by for _, by in self.proof.by)))
+        return ", ".join((self.within.shown, *(by for _, by in self.proof.by)))
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache | None = None) -> LevelProof:
@@ -202,15 +199,15 @@ def _bound(ts: TransitionSystem, proof: LevelProof, stated: Property, effort: Ef
     if refusing.refuses and wanted and not proof.needs_admission((Sort.REQUIREMENT, "", stated.name)):
         # what a refused cycle asks for may take longer
         for within in (*wanted, replace(wanted[-1], most=2 * wanted[-1].most + 1, exact=False)):
-            if (shown := _proved_bound(refusing, stated, within, effort)) is not None:
+            if (shown := proved_bound(refusing, stated, within, effort)) is not None:
                 return Bound(stated.name, within, admitting=False, proof=shown)
     for within in wanted:
-        if (shown := _proved_bound(ts, stated, within, effort)) is not None:
+        if (shown := proved_bound(ts, stated, within, effort)) is not None:
             return Bound(stated.name, within, admitting=refusing.refuses, proof=shown)
     return None
 
 
-def _proved_bound(ts: TransitionSystem, stated: Property, within: Try, effort: Effort) -> LevelProof | None:
+def proved_bound(ts: TransitionSystem, stated: Property, within: Try, effort: Effort) -> LevelProof | None:
     """Return the proof that a requirement is kept within a bound; None where it is not proved."""
     bounded = bounded_by(ts, stated, within)
     effort = replace(effort, walks=min(effort.walks, BOUND_WALKS), looks=False)

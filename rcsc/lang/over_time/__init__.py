@@ -28,13 +28,14 @@ Modules, in the order the data flows: `past` (what conditions remember), `requir
 statements), `run` (a monitor over a run).
 """
 
-from rcsc.lang.over_time.monitor import bounded, monitored
+from rcsc.lang.over_time.monitor import Rank, bounded, monitored
 from rcsc.lang.over_time.past import Past
 from rcsc.lang.over_time.requirement import Requirement, Scope, Timing, Trigger
 from rcsc.lang.over_time.run import Watch, begun, stepped
 
 __all__ = [
     "Past",
+    "Rank",
     "Requirement",
     "Scope",
     "Timing",

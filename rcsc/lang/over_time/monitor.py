@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from rcsc.lang.leaves import one_earlier
 from rcsc.lang.model import Apply, Bool, Expr, If, Int, Monitor, Op, Property, Statement
 from rcsc.lang.over_time.past import FALSE, TRUE, Past, State, both, either, negation, number
 from rcsc.lang.over_time.requirement import STOPPED, Requirement, Scope, Timing, Trigger
@@ -60,26 +61,45 @@ def monitored(past: Past, required: Requirement) -> tuple[Monitor, Expr]:
     return monitor, both(defined.now, negation(broken))
 
 
-def bounded(stated: Property, most: int, fair: Sequence[Expr] = ()) -> Property:
-    """Return the requirement that is broken, too, where it waits for more than so many rounds in a row.
+@dataclass(frozen=True, slots=True)
+class Rank:
+    """A number that goes one way alone while a requirement waits, and ends at the end of its range.
 
-    A round is a cycle; or, of `fair` conditions, cycles in which each of them has held. So where it waits for ever, and each of these holds
-    again and again, there are more rounds than any number: what is bounded comes. In a cycle that takes nothing no round goes on.
+    Attributes:
+        moves: The condition that a cycle moves it that way; `turns`, that it moves it back.
+    """
+
+    moves: Expr
+    turns: Expr
+
+
+def bounded(stated: Property, most: int, fair: Sequence[Expr] = (), rank: Rank | None = None) -> Property:
+    """Return the requirement that is broken, too, where it waits for more than so many rounds in a row, or its rank turns back meanwhile.
+
+    A round is a cycle; or, of `fair` conditions, cycles in which each of them has held. Where a rank moves, rounds are counted anew. So if
+    it waits for ever, and each of the conditions holds again and again, there are more rounds than any number: what is bounded comes. In a
+    cycle that takes nothing, and leaves every state as it is, no round goes on.
 
     Source: Claessen and Sorensson, "A liveness checking algorithm that counts", 2012.
     """
     monitor = stated.monitor
     assert monitor is not None
     made = Past(stated.name, list(monitor.states), list(monitor.truths), list(monitor.statements))
-    held = [_stored(made, condition) for condition in fair]
+    held = [_stored(made, "fair", condition) for condition in fair]
     seen = [made.state("seen fair", Bool(), initial=False) for _ in fair]
     over = both(*(either(now, before.was) for now, before in zip(held, seen, strict=True)))
     for now, before in zip(held, seen, strict=True):
         made.statements.append(before.set(both(monitor.waits, negation(over), either(now, before.was))))
     rounds = made.state("rounds", Int(0, most + 1), 0)
-    stays, counts = (rounds.set(rounds.was),), (rounds.counted(1),)
-    more = If(both(over, rounds.was_from(0, most)), counts, stays)
-    made.statements.append(If(monitor.waits, (more,), (rounds.set(number(0)),)))
+    none, stays, counts = (rounds.set(number(0)),), (rounds.set(rounds.was),), (rounds.counted(1),)
+    more: Statement = If(both(over, rounds.was_from(0, most)), counts, stays)
+    if rank is not None:
+        moves, turns = _stored(made, "moves", rank.moves), _stored(made, "turns", rank.turns)
+        waited = one_earlier(monitor.waits)
+        more = If(
+            both(waited, turns), (rounds.set(number(most + 1)),), (If(both(waited, moves), none, (more,)),)
+        )
+    made.statements.append(If(monitor.waits, (more,), none))
     watch = replace(
         monitor,
         states=tuple(made.states),
@@ -91,9 +111,9 @@ def bounded(stated: Property, most: int, fair: Sequence[Expr] = ()) -> Property:
     return replace(stated, condition=both(stated.condition, enough), monitor=watch)
 
 
-def _stored(made: Past, condition: Expr) -> Expr:
-    """Add the state that takes the truth of a fair condition; return what it is after the cycle."""
-    return made.truth("fair", lambda _: condition).now
+def _stored(made: Past, part: str, condition: Expr) -> Expr:
+    """Add the state that takes the truth of a condition; return what it is after the cycle."""
+    return made.truth(part, lambda _: condition).now
 
 
 # --- a monitor in the making -----------------------------------------------------------------

@@ -29,6 +29,7 @@ from rcsc.compose.counterexample.finding import (
     state_of,
 )
 from rcsc.compose.counterexample.trace import USUAL
+from rcsc.compose.proof.eventually import waiting
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.lang.model import Int, Kind
 
@@ -106,6 +107,8 @@ def _no_run(ts: TransitionSystem, explanation: Explanation, settings: TraceSetti
     if explanation.gave_up:
         return f"no run of {cycles} or fewer was found; the solver gave up on some of those"
     what = "is one that comes round" if explanation.warns else "breaks it"
+    if explanation.obligation.sort is Sort.REQUIREMENT and explanation.obligation.name in waiting(ts):
+        what += ", or comes round while it waits"
     return f"no run of {cycles} or fewer {what}: all of them{among} were looked at, {where}; longer ones were not"
 
 
@@ -199,6 +202,7 @@ def _say_finding(systems: Mapping[str, TransitionSystem], explanation: Explanati
     elif finding.lasso:
         what = f"waits for ever, {round_of(finding)}"
     alone = f" of level `{finding.level}` alone" if explanation.supposes else ""
+    alone = f",{alone}" if finding.lasso and not explanation.warns and alone else alone
     attach("note", f"{what}{alone}{begins}, {run_by}{legal}")
     if explanation.supposes:
         gives = "; ".join(

@@ -28,6 +28,7 @@ from rcsc.compose.exact.circuit import circuit
 from rcsc.compose.exact.export import aiger, btor2
 from rcsc.compose.invariant.cubes import as_condition, shown
 from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.notices import notices
 from rcsc.compose.proof.system import (
@@ -191,6 +192,10 @@ def exported(path: Path, only: tuple[str, ...], form: str, folder: Path) -> int:
             raise UnwritableError(str(folder), error.strerror or "no reason given") from error
         left_open = f"; left open: {', '.join(gates.opened)}" if gates.opened else ""
         click.echo(f"{file}: {len(gates.wanted)} obligations, {len(gates.latches)} bits of state{left_open}")
+        for requirement in waiting(ts):
+            click.echo(
+                f"{file}: of `{requirement}` only what a cycle breaks; not that it never waits for ever"
+            )
     return 0
 
 

@@ -1,0 +1,218 @@
+"""What is required *eventually* of a level: proved, with what it trusts; refuted, by a lasso that is shown, kept and run again."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from rcsc.base.host.cache import Cache
+from rcsc.compose.contract.claims import NEVER_REFUSED, NOT_FOR_EVER
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso, waiting_lasso_of
+from rcsc.compose.counterexample.trace import TraceSearch
+from rcsc.compose.proof.assume_guarantee import of_level
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
+from rcsc.compose.proof.system import keep, prove_transition_systems, recall, transition_systems
+from rcsc.front.commands import run
+from rcsc.proof.solvers.smtlib import cvc5_refutes
+from tests.support.programs.systems import LITTLE, alone, small_level, small_system, small_text, solo_system
+
+GIVEN = """\
+input asked : int 0 .. 3
+output given : bool
+state want : bool
+state waited : int 0 .. {most}
+requirement answers : when asked > 1, eventually given
+requirement kept : when want, eventually given
+requirement rests : whenever want, eventually not want and asked = 0
+table t {{
+  | line | asked | want  | waited   || given | waited     | want  |
+  |------|-------|-------|----------||-------|------------|-------|
+  | wait |       | true  | < {most} || false | waited + 1 | true  |
+  | give |       | true  | {most}   || true  | 0          | false |
+  | idle | < 2   | false |          || false | 0          | false |
+  | take | >= 2  | false |          || false | 0          | true  |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+
+
+@cache
+def given(most: int) -> tuple[TransitionSystem, LevelProof]:
+    """Return the level that gives after so many cycles, and its proof."""
+    ts = alone(GIVEN.format(most=most))
+    return ts, prove_level(ts, replace(LITTLE, looks=False))
+
+
+def claim(name: str) -> tuple[Verdict, tuple[str, ...]]:
+    """Return the claim about a requirement, and what it trusts."""
+    made = dict(of_level(*given(2)))[Sort.REQUIREMENT, "", name]
+    return made.verdict, made.trusts
+
+
+def test_what_comes_is_proved_with_the_fairness_that_it_needs() -> None:
+    """A refused input stands as it came: the level does not see that it was asked, so this needs more than that it comes some time."""
+    _, proof = given(2)
+    assert claim("kept") == (Verdict.PROVED, (f"`asked` of level `solo` is {NOT_FOR_EVER}",))
+    assert claim("answers") == (Verdict.PROVED, (f"`asked` of level `solo` is {NEVER_REFUSED}",))
+    assert claim("rests") == (Verdict.NOT_PROVED, ())
+    assert {bound.name: bound.how.partition(",")[0] for bound in proof.bounds} == {
+        "kept": "waits for 3 cycles at most",
+        "answers": "waits for 3 cycles at most",
+    }
+
+
+def test_a_long_wait_is_proved_and_refuted_by_a_search_of_all_states() -> None:
+    ts, proof = given(60)
+    assert {bound.name: bound.within.most for bound in proof.bounds} == {"kept": 61, "answers": 61}
+    lasso = waiting_lasso(ts, "rests", [TraceSearch(2)])
+    assert isinstance(lasso, Lasso)
+    assert (len(lasso.trace.steps), lasso.first) == (63, 2)
+
+
+FILLS = """\
+input step : int {least} .. 1000 clamp
+input asked : bool
+output given : bool
+state want : bool
+state total : int 0 .. 60000
+requirement kept : when want, eventually given
+module add reads step, total writes total {{ total := min(total + step, 60000) }}
+module clear writes total {{ total := 0 }}
+table t {{
+  | line | asked | want  | total    || given | want  | procedures |
+  |------|-------|-------|----------||-------|-------|------------|
+  | wait |       | true  | < 60000  || false | true  | add        |
+  | give |       | true  | >= 60000 || true  | false | clear      |
+  | idle | false | false |          || false | false |            |
+  | take | true  | false |          || false | true  |            |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+
+
+def test_a_number_that_only_rises_shows_that_it_comes() -> None:
+    """Its states are too many to be listed, and no bound is small."""
+    ts = alone(FILLS.format(least=1))
+    proof = prove_level(ts, LITTLE)
+    [bound] = proof.bounds
+    assert proof.verdict(Sort.REQUIREMENT, "", "kept") is Verdict.PROVED
+    assert bound.how == "waits for 1 cycle at most in which `total` does not rise"
+
+
+def test_a_number_that_may_stand_shows_nothing() -> None:
+    ts = alone(FILLS.format(least=0))
+    assert prove_level(ts, LITTLE).bounds == ()
+    lasso = waiting_lasso(ts, "kept", [TraceSearch(4)])
+    assert isinstance(lasso, Lasso)
+    assert [step.line for step in lasso.trace.steps[lasso.first - 1 :]] == ["wait"]
+
+
+# --- beside others ------------------------------------------------------------------------------
+
+ENDS = "\nrequirement ends : whenever report.status_report = executing, eventually {}\n"
+AGAIN = "report.status_report /= executing or new_command"
+
+
+def test_a_level_answers_if_its_subordinates_do(tmp_path: Path) -> None:
+    """The claim rests on the termination of the level below."""
+    upper = small_text("upper") + ENDS.format(AGAIN)
+    systems = transition_systems(small_system(tmp_path, upper=upper))
+    proof = prove_transition_systems(systems, LITTLE, 1, tuple(systems))
+    level = next(level for level in proof.levels if level.level == "upper")
+    [bound] = level.bounds
+    assert bound.within.fair
+    needs = dict(of_level(systems["upper"], level))[Sort.REQUIREMENT, "", "ends"].rests_on
+    assert {name for name, _ in needs} == {"upper", "lower"}
+    # the lower one waits for an input of its own, for ever: so this is not proved of the system
+    assert not proof.of("upper", (Sort.REQUIREMENT, "", "ends")).proved
+
+
+def test_a_lasso_gives_orders_or_has_answers(tmp_path: Path) -> None:
+    """That a subordinate does not answer refutes nothing: what fails does not come to be done."""
+    upper = small_text("upper") + ENDS.format("report.status_report = done")
+    ts = small_level(tmp_path, "upper", upper=upper)
+    lasso = waiting_lasso(ts, "ends", [TraceSearch(8, legal=True)])
+    assert isinstance(lasso, Lasso)
+    [step] = lasso.trace.steps[lasso.first - 1 :]
+    assert step.after["lower.status_report"] != step.after["report.status_report"] == 2
+
+
+# --- shown, kept, run again ------------------------------------------------------------------------
+
+
+def test_a_lasso_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, found, cases = solo_system(tmp_path, GIVEN.format(most=2)), tmp_path / "found", tmp_path / "cases"
+    assert run(["prove", str(path), "--log", str(found), "--freeze", str(cases), "--no-cache"]) == 1
+    said = capsys.readouterr()
+    assert "waits for 3 cycles at most, by search of all" in said.out
+    assert (
+        "waits for ever, cycles 2 to 5 again and again, as the interpreter, the Python and the C executors run it"
+        in said.err
+    )
+    assert "! from here on cycles 2 to 5 again" in said.err
+    assert "`rests` waits as it did before cycle 2" in said.err
+    [case] = cases.iterdir()
+    assert run(["prove", "--case", str(case)]) == 1
+    text = path.with_name("solo.rcs").read_text(encoding="utf-8")
+    path.with_name("solo.rcs").write_text(
+        text.replace("not want and asked = 0", "not want"), encoding="utf-8"
+    )
+    assert run(["prove", "--case", str(case)]) == 0
+
+
+def test_a_lasso_is_part_of_the_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = solo_system(tmp_path, GIVEN.format(most=2))
+    assert run(["prove", str(path), "--json", "--no-cache"]) == 1
+    [finding] = json.loads(capsys.readouterr().out)["findings"]
+    assert (finding["name"], finding["lap"], len(finding["time_line"])) == ("rests", 2, 5)
+
+
+def test_a_run_that_does_not_come_round_is_no_lasso() -> None:
+    ts = alone(GIVEN.format(most=2))
+    lasso = waiting_lasso(ts, "rests", [TraceSearch(6)])
+    assert isinstance(lasso, Lasso)
+    steps = lasso.trace.steps
+    assert waiting_lasso_of(ts, "rests", steps) == lasso.first
+    assert waiting_lasso_of(ts, "rests", steps[:-1]) is None
+    assert waiting_lasso_of(ts, "kept", steps) is None
+
+
+def test_bounds_are_kept_and_recalled(tmp_path: Path) -> None:
+    (ts, proof), kept_in = given(2), Cache(tmp_path, b"0" * 32, "tool")
+    keep(kept_in, ts, LITTLE, proof)
+    kept = recall(kept_in, ts, LITTLE)
+    assert kept is not None
+    assert [(owed.key, verdict) for owed, verdict in kept.verdicts] == [
+        (owed.key, verdict) for owed, verdict in proof.verdicts
+    ]
+    assert [(bound.name, bound.within, bound.admitting, bound.how) for bound in kept.bounds] == [
+        (bound.name, bound.within, bound.admitting, bound.how) for bound in proof.bounds
+    ]
+    assert certificate(ts, kept).keys() == certificate(ts, proof).keys()
+
+
+def test_cvc5_confirms_each_bound() -> None:
+    scripts = certificate(*given(2))
+    asked = {name: text for name, text in scripts.items() if name.startswith("requirement ")}
+    assert {name.split()[1] for name in asked} == {"answers", "kept"}
+    assert all(cvc5_refutes(text) for text in asked.values())
+
+
+def test_an_export_says_what_it_leaves_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        run(
+            [
+                "prove",
+                str(solo_system(tmp_path, GIVEN.format(most=2))),
+                "--export",
+                "btor2",
+                str(tmp_path / "to"),
+            ]
+        )
+        == 0
+    )
+    assert "of `kept` only what a cycle breaks; not that it never waits for ever" in capsys.readouterr().out
