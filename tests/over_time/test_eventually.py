@@ -4,6 +4,8 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from random import Random
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,12 +13,17 @@ from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import NEVER_REFUSED, NOT_FOR_EVER
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.cycle_run import one_cycle
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings
 from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso, waiting_lasso_of
 from rcsc.compose.counterexample.trace import TraceSearch
 from rcsc.compose.proof.assume_guarantee import of_level
-from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
+from rcsc.compose.proof.eventually import Try, waiting
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level, proved_bound
 from rcsc.compose.proof.system import keep, prove_transition_systems, recall, transition_systems
 from rcsc.front.commands import run
+from rcsc.front.commands.systems.explained import _no_run
+from rcsc.lang.interpret import Fault, holds, initial
 from rcsc.proof.solvers.smtlib import cvc5_refutes
 from tests.support.programs.systems import LITTLE, alone, small_level, small_system, small_text, solo_system
 
@@ -65,6 +72,24 @@ def test_what_comes_is_proved_with_the_fairness_that_it_needs() -> None:
     }
 
 
+def test_cycles_that_refuse_an_input_do_not_count() -> None:
+    """In runs by the interpreter that refuse inputs now and then it waits longer, but not in more cycles that take them."""
+    ts, proof = given(2)
+    within = next(bound.within.most for bound in proof.bounds if bound.name == "kept" and not bound.admitting)
+    random, monitor = Random(0), waiting(ts)["kept"].monitor  # noqa: S311  # the same runs each time
+    assert monitor is not None
+    waited, taken_since, most, most_taken = 0, 0, 0, 0
+    now, found = dict(initial(ts.program)), None
+    for _ in range(400):
+        step = one_cycle(ts, now, {"asked": random.choice((0, 2, 3, 7, 7))}, (), found)
+        now, found = dict(step.after), dict(step.left)
+        waits = holds(monitor.waits, step.left)
+        waited = waited + 1 if waits else 0
+        taken_since = taken_since + (step.fault is Fault.OK) if waits else 0
+        most, most_taken = max(most, waited), max(most_taken, taken_since)
+    assert most_taken == within < most
+
+
 def test_a_long_wait_is_proved_and_refuted_by_a_search_of_all_states() -> None:
     ts, proof = given(60)
     assert {bound.name: bound.within.most for bound in proof.bounds} == {"kept": 61, "answers": 61}
@@ -111,6 +136,39 @@ def test_a_number_that_may_stand_shows_nothing() -> None:
     assert [step.line for step in lasso.trace.steps[lasso.first - 1 :]] == ["wait"]
 
 
+MEASURES = """\
+input asked : bool
+output given : bool
+state want : bool
+state y : int 0 .. 3
+requirement kept : when want, eventually given
+requirement read : when want, eventually y = 2
+extern procedure measure reads want writes y python "m:f" c "m_f"
+table t {
+  | line | asked | want  || given | want  | procedures |
+  |------|-------|-------||-------|-------|------------|
+  | give |       | true  || true  | false | measure    |
+  | idle | false | false || false | false |            |
+  | take | true  | false || false | true  |            |
+}
+level solo { period 40 [ms] table t }
+"""
+
+
+def test_results_that_are_refused_now_and_then_put_it_off() -> None:
+    """What an extern procedure gives is no input: nothing is listed, and its values may be any."""
+    ts = alone(MEASURES)
+    proof = prove_level(ts, replace(LITTLE, looks=False))
+    claims = dict(of_level(ts, proof))
+    made = claims[Sort.REQUIREMENT, "", "kept"]
+    assert (made.verdict, made.trusts) == (
+        Verdict.PROVED,
+        (f"extern procedures of level `solo` are {NOT_FOR_EVER}",),
+    )
+    assert claims[Sort.REQUIREMENT, "", "read"].verdict is Verdict.NOT_PROVED
+    assert isinstance(waiting_lasso(ts, "read", [TraceSearch(4)]), Lasso)
+
+
 # --- beside others ------------------------------------------------------------------------------
 
 ENDS = "\nrequirement ends : whenever report.status_report = executing, eventually {}\n"
@@ -133,8 +191,10 @@ def test_a_level_answers_if_its_subordinates_do(tmp_path: Path) -> None:
 
 def test_a_lasso_gives_orders_or_has_answers(tmp_path: Path) -> None:
     """That a subordinate does not answer refutes nothing: what fails does not come to be done."""
-    upper = small_text("upper") + ENDS.format("report.status_report = done")
+    upper = small_text("upper") + ENDS.format("report.status_report = done or new_command")
     ts = small_level(tmp_path, "upper", upper=upper)
+    quick = replace(LITTLE, looks=False)
+    assert proved_bound(ts, waiting(ts)["ends"], Try(4, fair=True), quick).open
     lasso = waiting_lasso(ts, "ends", [TraceSearch(8, legal=True)])
     assert isinstance(lasso, Lasso)
     [step] = lasso.trace.steps[lasso.first - 1 :]
@@ -195,6 +255,18 @@ def test_bounds_are_kept_and_recalled(tmp_path: Path) -> None:
     assert certificate(ts, kept).keys() == certificate(ts, proof).keys()
 
 
+def test_a_bound_of_another_version_is_not_recalled(tmp_path: Path) -> None:
+    """Then the level is proved anew: what waits for ever is never taken for proved."""
+    (ts, proof), kept_in = given(2), Cache(tmp_path, b"0" * 32, "tool")
+    renamed = tuple(replace(bound, name="answered") for bound in proof.bounds)
+    keep(kept_in, ts, LITTLE, replace(proof, bounds=renamed))
+    assert recall(kept_in, ts, LITTLE) is None
+    keep(kept_in, ts, LITTLE, replace(proof, bounds=()))
+    kept = recall(kept_in, ts, LITTLE)
+    assert kept is not None
+    assert kept.verdict(Sort.REQUIREMENT, "", "kept") is Verdict.NOT_PROVED
+
+
 def test_cvc5_confirms_each_bound() -> None:
     scripts = certificate(*given(2))
     asked = {name: text for name, text in scripts.items() if name.startswith("requirement ")}
@@ -216,3 +288,29 @@ def test_an_export_says_what_it_leaves_out(tmp_path: Path, capsys: pytest.Captur
         == 0
     )
     assert "of `kept` only what a cycle breaks; not that it never waits for ever" in capsys.readouterr().out
+
+
+def test_what_was_looked_at_is_told_of_what_is_open() -> None:
+    ts, proof = given(2)
+    said = {
+        owed.name: _no_run(ts, Explanation("solo", owed), TraceSettings(SimpleNamespace(), 8))  # type: ignore[arg-type]  # not read
+        for owed, _ in proof.verdicts
+    }
+    assert said["rests"].startswith(
+        "no run of 8 cycles or fewer breaks it, or comes round while it waits: all of them"
+    )
+    assert said[""].startswith("no run of 8 cycles or fewer breaks it: all of them")
+
+
+@pytest.mark.parametrize(
+    ("within", "said"),
+    [
+        (Try(0), "never waits"),
+        (Try(1), "waits for 1 cycle at most"),
+        (Try(2, fair=True), "waits for 2 rounds of orders and answers at most"),
+        (Try(0, rank="n"), "waits for no cycle in which `n` does not rise"),
+        (Try(4, rank="n", rises=False), "waits for 4 cycles at most in which `n` does not fall"),
+    ],
+)
+def test_a_bound_is_said_in_words(within: Try, said: str) -> None:
+    assert within.shown == said

@@ -12,10 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rcsc.compose.exact.circuit import Circuit
-from rcsc.compose.exact.explicit import Pass, Run, Search, applies, at_literal
+from rcsc.compose.exact.explicit import Pass, Run, Search, State, applies, at_literal
 from rcsc.compose.exact.unrolled import Unrolled
 from rcsc.proof.solvers.sat import GaveUpError, Sat
 from rcsc.proof.symbolic.bits import FALSE, TRUE
@@ -78,15 +77,15 @@ def of_all_states(circuit: Circuit) -> Waits | None:
 def _waiting_edges(search: Search) -> list[list[int]] | None:
     """List for each state, by position, those to which a cycle leads in which it waits; None where they are too many."""
     places = {state: at for at, state in enumerate(search.found.states)}
-    onward: list[list[int]] = []
-    edges = 0
+    onward: list[list[int]] = [[] for _ in places]
+    edges = begun = 0
     for part, columns in search.passes(search.found.states):
-        rows = _waiting_rows(search.step, columns, len(part))
-        for own in rows:
-            onward.append(sorted(places[row.tobytes()] for row in own))
-            edges += len(own)
+        for source, end in _waiting_edges_of(search.step, columns, len(part)):
+            onward[begun + source].append(places[end])
+            edges += 1
         if edges > MOST_EDGES:
             return None
+        begun += len(part)
     return onward
 
 
@@ -95,25 +94,24 @@ def _waiting_at_first(search: Search) -> Iterator[int]:
     places = {state: at for at, state in enumerate(search.found.states)}
     for frame in search.circuit.firsts:
         first = Pass(search.circuit, frame)
-        [rows] = _waiting_rows(first, first.columns(), 1)
-        yield from (places[row.tobytes()] for row in rows)
+        yield from (places[end] for _, end in _waiting_edges_of(first, first.columns(), 1))
 
 
-def _waiting_rows(ran: Pass, columns: dict[int, int], states: int) -> list[npt.NDArray[np.uint8]]:
-    """List for each state of a pass the states after those of its cycles in which it waits, each once."""
+def _waiting_edges_of(ran: Pass, columns: dict[int, int], states: int) -> Iterator[tuple[int, State]]:
+    """Yield for each state of a pass, by position, each state after a cycle in which it waits, once and in order."""
     lanes = ran.many * states
     values = ran.values(columns, (1 << lanes) - 1)
     waits = values[at_literal(ran.frame.valid)] & values[at_literal(ran.frame.goes_on)]
     waits &= values[at_literal(-ran.frame.holds[0])]
-    kept = np.unpackbits(
-        np.frombuffer(waits.to_bytes((lanes + 7) // 8, "little"), np.uint8), bitorder="little"
-    )
-    rows = ran.ends(values, lanes)
-    found = []
-    for at in range(states):
-        own = rows[at * ran.many : (at + 1) * ran.many][kept[at * ran.many : (at + 1) * ran.many] == 1]
-        found.append(np.unique(own, axis=0) if len(own) else own)
-    return found
+    bits = np.frombuffer(waits.to_bytes((lanes + 7) // 8, "little"), np.uint8)
+    kept = np.flatnonzero(np.unpackbits(bits, bitorder="little")[:lanes])
+    if not len(kept):
+        return
+    sources = (kept // ran.many).astype(">u4").view(np.uint8).reshape(-1, 4)
+    edges = np.ascontiguousarray(np.hstack([sources, ran.ends(values, lanes)[kept]]))
+    for edge in np.unique(edges.view(f"V{edges.shape[1]}").ravel()):
+        whole = edge.tobytes()
+        yield int.from_bytes(whole[:4], "big"), whole[4:]
 
 
 def _longest(onward: list[list[int]]) -> tuple[list[int], set[int]]:

@@ -74,9 +74,10 @@ class Try:
         """For how long it waits, in words."""
         if not self.most and not self.rank:
             return "never waits"
-        round_ = "round of orders and answers" if self.fair else "cycle"
+        s = "s" if self.most > 1 else ""
+        round_ = f"round{s} of orders and answers" if self.fair else f"cycle{s}"
         moves = f" in which `{self.rank}` does not {'rise' if self.rises else 'fall'}" if self.rank else ""
-        return f"waits for {self.most or 'no'} {round_}{'s' * (self.most > 1)}{' at most' * (self.most > 0)}{moves}"
+        return f"waits for {self.most or 'no'} {round_}{' at most' if self.most else ''}{moves}"
 
 
 def waiting(ts: TransitionSystem) -> dict[str, Property]:
@@ -91,11 +92,11 @@ def tries(ts: TransitionSystem, stated: Property) -> Iterator[Try]:
     if made is not None and found is not None and (found.lasso is None or made.opened):
         if found.complete and found.lasso is None:
             yield Try(found.most, exact=True)
-        elif (
-            found.most < found.cycles
-        ):  # what waits as long as a run was looked at has no bound that anything speaks for
+        elif found.most < found.cycles:  # else nothing speaks for any bound
             yield from (Try(found.most << times) for times in range(DOUBLED))
         yield from _ranks(ts, stated)
+    elif made is None:
+        yield from (Try(1 << times) for times in range(DOUBLED))
     if ts.links.below:
         yield from (Try(most, fair=True) for most in ROUNDS)
 

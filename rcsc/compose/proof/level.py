@@ -176,48 +176,61 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
         for name, stated in waiting(ts).items()
         if proof.verdict(Sort.REQUIREMENT, "", name) in ACCEPTED
     )
-    every = tuple(bound for stated in wanted if (bound := _bound(ts, proof, stated, effort)) is not None)
-    proof = bounded_proof(ts, proof, every)
+    tried = {stated.name: _bound(ts, proof, stated, effort) for stated in wanted}
+    bounds = tuple(bound for bound in tried.values() if isinstance(bound, Bound))
+    undecided = frozenset(name for name, bound in tried.items() if bound is Verdict.UNDECIDED)
+    proof = bounded_proof(ts, proof, bounds, undecided)
     return replace(proof, seconds=proof.seconds + time.perf_counter() - begun)
 
 
-def bounded_proof(ts: TransitionSystem, proof: LevelProof, bounds: tuple[Bound, ...]) -> LevelProof:
-    """Return the proof with these bounds: requirements that may wait for ever, and have none, are not proved."""
+def bounded_proof(
+    ts: TransitionSystem,
+    proof: LevelProof,
+    bounds: tuple[Bound, ...],
+    undecided: Container[str] = (),
+) -> LevelProof:
+    """Return the proof with these bounds: requirements that may wait for ever, and have none, are not proved, or undecided."""
     names = {bound.name for bound in bounds}
-    unbounded = {(Sort.REQUIREMENT, "", name) for name in waiting(ts) if name not in names}
+    unbounded: dict[Key, Verdict] = {
+        (Sort.REQUIREMENT, "", name): Verdict.UNDECIDED if name in undecided else Verdict.NOT_PROVED
+        for name in waiting(ts)
+        if name not in names
+    }
     verdicts = tuple(
-        (owed, Verdict.NOT_PROVED if owed.key in unbounded and verdict in ACCEPTED else verdict)
+        (owed, unbounded.get(owed.key, verdict) if verdict in ACCEPTED else verdict)
         for owed, verdict in proof.verdicts
     )
     how: dict[Key, str] = {(Sort.REQUIREMENT, "", bound.name): bound.how for bound in bounds}
     return replace(proof, verdicts=verdicts, bounds=bounds, by=tuple({**dict(proof.by), **how}.items()))
 
 
-def _bound(ts: TransitionSystem, proof: LevelProof, stated: Property, effort: Effort) -> Bound | None:
-    """Prove a bound for a requirement: with refusals, if it is proved with these in each cycle; else without."""
-    wanted, refusing = list(tries(ts, stated)), ts.refusing()
+def _bound(ts: TransitionSystem, proof: LevelProof, stated: Property, effort: Effort) -> Bound | Verdict:
+    """Prove a bound for a requirement: with refusals, if it is proved with these in each cycle; else without. Return why there is none."""
+    wanted, refusing, why = list(tries(ts, stated)), ts.refusing(), Verdict.NOT_PROVED
+    every = [(ts, within) for within in wanted]
     if refusing.refuses and wanted and not proof.needs_admission((Sort.REQUIREMENT, "", stated.name)):
         # what a refused cycle asks for may take longer
-        for within in (*wanted, replace(wanted[-1], most=2 * wanted[-1].most + 1, exact=False)):
-            if (shown := proved_bound(refusing, stated, within, effort)) is not None:
-                return Bound(stated.name, within, admitting=False, proof=shown)
-    for within in wanted:
-        if (shown := proved_bound(ts, stated, within, effort)) is not None:
-            return Bound(stated.name, within, admitting=refusing.refuses, proof=shown)
-    return None
+        longer = replace(wanted[-1], most=2 * wanted[-1].most + 1, exact=False)
+        every = [*((refusing, within) for within in (*wanted, longer)), *every]
+    for where, within in every:
+        shown = proved_bound(where, stated, within, effort)
+        if not shown.open:
+            admitting = refusing.refuses and not where.refuses
+            return Bound(stated.name, within, admitting, without_nodes(shown))
+        if any(verdict is Verdict.UNDECIDED for _, verdict in shown.verdicts):
+            why = Verdict.UNDECIDED
+    return why
 
 
-def proved_bound(ts: TransitionSystem, stated: Property, within: Try, effort: Effort) -> LevelProof | None:
-    """Return the proof that a requirement is kept within a bound; None where it is not proved."""
+def proved_bound(ts: TransitionSystem, stated: Property, within: Try, effort: Effort) -> LevelProof:
+    """Prove that a requirement is kept within a bound: of listed states at once, else with a search for an invariant."""
     bounded = bounded_by(ts, stated, within)
     effort = replace(effort, walks=min(effort.walks, BOUND_WALKS), looks=False)
-    listed = within.exact and may_be_listed(bounded)
-    for searches in (False, True) if listed else (True,):
-        walked = begin(bounded, (), effort) if searches else FoundInvariant()
-        shown = _proved(bounded, effort, None, walked, Candidates(), searches=searches)
-        if not shown.open:
-            return without_nodes(shown)
-    return None
+    if within.exact and may_be_listed(bounded):
+        listed = _proved(bounded, effort, None, FoundInvariant(), Candidates(), searches=False)
+        if not listed.open:
+            return listed
+    return _proved(bounded, effort, None, begin(bounded, (), effort), Candidates())
 
 
 def _in_each_cycle(ts: TransitionSystem, effort: Effort, cache: Cache | None) -> LevelProof:

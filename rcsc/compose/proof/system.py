@@ -373,10 +373,10 @@ def _whole(ts: TransitionSystem, kept: _Kept) -> LevelProof | None:
         proof = None if with_refusals is None or without is None else joined(with_refusals, without)
     else:
         proof = _recalled(ts.refusing(), kept)
-    bounds = [bound for one in kept.bounds if (bound := _recalled_bound(ts, one)) is not None]
-    if proof is None or len(bounds) < len(kept.bounds):
+    if proof is None:
         return None
-    return bounded_proof(ts, proof, tuple(bounds))
+    bounds = [bound for one in kept.bounds if (bound := _recalled_bound(ts, one)) is not None]
+    return bounded_proof(ts, proof, tuple(bounds)) if len(bounds) == len(kept.bounds) else None
 
 
 def _recalled_bound(ts: TransitionSystem, kept: _KeptBound) -> Bound | None:
