@@ -193,7 +193,7 @@ def every_expression(program: Program) -> Iterator[Expr]:
     """Yield the expressions that a program tests, states and calculates."""
     for stated in (program.assumptions, program.invariants):
         yield from (each.condition for each in stated)
-    yield from (condition for each in program.properties for condition in each.about)
+    yield from (condition for each in program.stated for condition in each.about)
     for table in program.tables:
         yield from (test.condition for test in table.distinct_tests)
     for statement in every_statement(program):
@@ -280,7 +280,7 @@ class Uses:
             self._reads(f"assumption {assumed.name}", "", assumed.condition, assumed.requirements)
         for invariant in program.invariants:
             self._reads(f"invariant {invariant.name}", "", invariant.condition, invariant.requirements)
-        for stated in program.properties:
+        for stated in program.stated:
             leaves = (VariableName(leaf.removeprefix(BEFORE)) for leaf in spoken_of(stated))
             self._note(self.read, f"{stated.word} {stated.name}", "", leaves, stated.requirements)
 

@@ -626,8 +626,9 @@ class Property:
             gives, leaves as the cycle before left them (before the first: as the level begins).
         text: As it was written, after the colon.
         standard: Whether it comes with the protocol, and nobody wrote it.
-        monitor: Of a requirement over time, the states that its condition reads.
+        monitor: Of a requirement or an assumption over time, the states that its condition reads.
         monitored: Whether every run watches it.
+        assumed: Whether it is an assumption over time (`Program.environment`): of what comes from outside, and trusted.
     """
 
     name: str
@@ -639,10 +640,13 @@ class Property:
     requirements: tuple[str, ...] = field(default=(), compare=False, repr=False)
     monitor: "Monitor | None" = None
     monitored: bool = field(default=False, repr=False)
+    assumed: bool = False
 
     @property
     def word(self) -> str:
         """What its declaration calls it."""
+        if self.assumed:
+            return "assumption"
         return "property" if self.monitor is None else "requirement"
 
     @property
@@ -1057,6 +1061,7 @@ class Program:
         own_tables: Names of the tables that the root file itself declares.
         roles: None where the protocol is written by hand, or there is none.
         restart: What leaves adopt when the level starts anew (`rcsc.lang.restart`); None where nothing declares it, and names decide.
+        environment: What is assumed over time of what comes from outside: trusted, and claimed by nobody.
     """
 
     name: str
@@ -1075,6 +1080,17 @@ class Program:
     properties: tuple[Property, ...] = ()
     roles: Roles | None = None
     restart: tuple[tuple[VariableName, Adopted], ...] | None = None
+    environment: tuple[Property, ...] = ()
+
+    @property
+    def stated(self) -> tuple[Property, ...]:
+        """What is assumed over time, and what is claimed."""
+        return (*self.environment, *self.properties)
+
+    @property
+    def over_time(self) -> tuple[Property, ...]:
+        """What has a monitor: assumptions over time, then requirements."""
+        return tuple(stated for stated in self.stated if stated.monitor is not None)
 
     @property
     def types(self) -> "tuple[Enum | Record, ...]":

@@ -151,8 +151,8 @@ def test_each_part_of_a_requirement_may_remember() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("property p : once a", "`once` stands in requirements over time"),
-        ("assume p : a since b", "`since` stands in requirements over time"),
+        ("property p : once a", "`once` stands in requirements and assumptions over time"),
+        ("assume p : a since b", "`since` stands in requirements and assumptions over time"),
         ("requirement p : always n > was (was n)", "`was` goes back one cycle, not two"),
         ("requirement p : always a for once b", None),
     ],

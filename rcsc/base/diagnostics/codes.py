@@ -1045,6 +1045,23 @@ class Code(StrEnum):
         output given : bool
         requirement given_at_last : while mode, at last given
     """
+    NOT_OF_OUTSIDE = """RCS324: an assumption over time that is not about what comes from outside
+
+    `rcsc prove` trusts an assumption over time, and so it may only restrict what no level writes: inputs from outside. What it reads of the
+    level's own variables is what the cycle before left. So its response is about an input, and it is `assumed`, or `assumed monitored`,
+    which runs watch, too. It is of the whole level, and no table names it under `assuming`. Orders, reports, answers of the database and
+    what other levels write follow the protocol or are proved of who writes them: it reads none of them.
+
+        input rolls : bool
+        output speed : int 0 .. 100
+        assume stops : when speed = 0, within 10 cycles, speed = 0
+
+    error: `speed = 0` is about no input: nothing from outside can keep it
+
+        input rolls : bool
+        output speed : int 0 .. 100
+        assume stops : when speed = 0, within 10 cycles, not rolls
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least
@@ -1894,6 +1911,26 @@ class Code(StrEnum):
           | rest | false |        || 0          | false |
         }
         level l { table t }
+    """
+    CANNOT_BE_KEPT = """RCS761: an assumption over time that cannot always be kept
+
+    What is assumed over time of what comes from outside restricts inputs, and never what the level does: after whatever that has done,
+    some inputs must keep the assumption, together with all others that are about the same inputs. After the run that is shown, none were
+    found that do: every value of truth values and members was tried, and of numbers those by the constants that conditions compare them
+    with, the ends of their range, and the value that they had. Nothing is proved of the level, since all would be proved of runs that come
+    to such an end. Have it restrict less, or name the case in which it does not apply.
+
+        input rolls : bool
+        output speed : int 0 .. 100
+        assume stops : always not rolls
+        assume tested : at least 10 cycles apart, rolls
+        assume starts : when speed = 0, within 2 cycles, rolls
+        table t {
+          | line | rolls || speed |
+          | stop | true  || 0     |
+          | rest | false || 0     |
+        }
+        level l { period 10 [ms] table t }
     """
     GRAPH_NO_STATE = """RCS771: a table has no state to draw
 

@@ -46,7 +46,6 @@ from rcsc.lang.model import (
     Variable,
     VariableName,
 )
-from rcsc.lang.over_time.past import looks_back as looks_back_twice
 from rcsc.lang.restart import Adopted, After, SameAs, Stands
 
 KEEP = "keep_previous"
@@ -55,7 +54,7 @@ KEEP = "keep_previous"
 
 def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
     """Return the expression over the values after the cycle before; None after an error."""
-    if scope.past is not None and looks_back_twice(read_by(now)):
+    if scope.past is not None and scope.past.is_of_before(read_by(now)):
         if isinstance(now.type, Bool):
             return scope.past.before(now)
         scope.report(
@@ -63,6 +62,11 @@ def before(scope: Scope, now: Expr, span: Span) -> Expr | None:
             "`was` goes back one cycle, not two",
             span,
             "a condition may: `was (x > was y)`",
+            *(
+                ("an assumption reads what the level writes as the cycle before left it",)
+                if scope.past.found
+                else ()
+            ),
         )
         return None
     if scope.in_property:

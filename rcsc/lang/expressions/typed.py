@@ -397,7 +397,8 @@ def _since(scope: Scope, body: Body, word: str, operands: tuple[tree.Expr, ...],
     """Resolve `once a`, or `a since b`, which a requirement over time remembers."""
     if scope.past is None or scope.no_before:
         message = (
-            scope.no_before.replace("`was`", f"`{word}`") or f"`{word}` stands in requirements over time"
+            scope.no_before.replace("`was`", f"`{word}`")
+            or f"`{word}` stands in requirements and assumptions over time"
         )
         scope.report(Code.NO_CYCLE_BEFORE, message, span)
         return None

@@ -1,4 +1,4 @@
-"""Requirements over time, each as a deterministic monitor.
+"""Requirements and assumptions over time, each as a deterministic monitor.
 
 A *requirement* has a *scope* (in which cycles it applies), a *trigger* (which of these ask for something), a *timing* (when it has to
 come) and a *response* (what has to hold). The scope cuts a run into *intervals*, each judged by itself. A *monitor* looks at each cycle
@@ -20,6 +20,9 @@ False
 
 Words, scopes and timings: Giannakopoulou, Pressburger, Mavridou and Schumann, *Automated formalization of structured natural language
 requirements*, Information and Software Technology 137 (2021). Each monitor is held against the formulas that FRET publishes.
+
+An assumption over time is the same of what comes from outside. It reads what the level writes as the cycle before left it
+(`Past.as_found`): so the inputs of a cycle tell whether it is kept.
 
 Trusted: all of it, for what a requirement means. Cost: a monitor has at most six states besides the truths that it looks at, but for
 *exactly after* in an `only` scope, which has one for each cycle of its time.

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import reduce
 
+from rcsc.lang.leaves import renamed
 from rcsc.lang.model import (
     BEFORE,
     WATCHED,
@@ -121,12 +122,22 @@ class Past:
     Attributes:
         name: The requirement's.
         truths, statements: As of a `Monitor`.
+        found: Leaves that stand for what the cycle finds, which the cycle before left: all of the level's own, of an assumption.
     """
 
     name: str
     states: list[Hidden] = field(default_factory=list)
     truths: list[tuple[VariableName, Expr]] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
+    found: frozenset[VariableName] = frozenset()
+
+    def is_of_before(self, names: Iterable[VariableName]) -> bool:
+        """Return whether one of the names stands for a value after the cycle before."""
+        return any(name.startswith(BEFORE) or name in self.found for name in names)
+
+    def as_found(self, condition: Expr) -> Expr:
+        """Return a condition with each leaf that is `found` as the cycle before left it."""
+        return renamed(condition, lambda name: earlier(name) if name in self.found else name)
 
     def state(self, part: str, kind: Scalar, initial: Value) -> State:
         """Add a state; its name is numbered where there is one of that name."""
@@ -161,8 +172,3 @@ class Past:
     def before(self, condition: Expr) -> Expr:
         """Return the condition that it held after the cycle before, also where it looks back itself."""
         return self.truth("before", lambda _: condition).was
-
-
-def looks_back(names: Iterable[str]) -> bool:
-    """Return whether one of the names is of a value after the cycle before."""
-    return any(name.startswith(BEFORE) for name in names)

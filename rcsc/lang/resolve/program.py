@@ -122,7 +122,11 @@ class _Resolver:
             ),
         )
         lines = lines_kept(scope, levels, tables, self.root)
-        properties = tuple(replace(each, standard=each.name not in claimed) for each in stated(scope, all_))
+        every = stated(scope, all_)
+        environment = tuple(each for each in every if each.assumed)
+        properties = tuple(
+            replace(each, standard=each.name not in claimed) for each in every if not each.assumed
+        )
         keep = keeping(scope, {*scope.procedures, *owners.written}, Span(self.root, 0, 0))
         if keep is not None:
             procedures += (keep,)
@@ -149,6 +153,7 @@ class _Resolver:
             properties,
             roles_of(scope, parties),
             restart,
+            environment,
         )
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:
@@ -198,10 +203,16 @@ class _Resolver:
         self, all_: list[tree.Declaration], assumptions: set[AssumptionName], run: Collection[str]
     ) -> tuple[Table, ...]:
         tables = []
+        over_time = {
+            d.name.text for d in all_ if isinstance(d, tree.RequirementDecl) and d.standing is not None
+        }
         for declaration in all_:
             if isinstance(declaration, tree.TableDecl) and self.scope.claim(declaration.name, "table"):
                 for relied in declaration.assuming:
-                    if relied.text not in assumptions:
+                    if relied.text in over_time:
+                        message = f"assumption `{relied.text}` is over time: it is of the whole level, and no table names it"
+                        self.scope.report(Code.NOT_OF_OUTSIDE, message, relied.span, "leave it out")
+                    elif relied.text not in assumptions:
                         self.scope.unknown("assumption", relied, list(assumptions))
                 name = declaration.name.text
                 missing = f"no level runs table `{name}`, so that a time is no number of cycles"

@@ -1,11 +1,11 @@
-"""Properties, and requirements over time, as the text says them, to conditions of the model.
+"""Properties, and requirements and assumptions over time, as the text says them, to conditions of the model.
 
-In: declarations. Out: a `Property` for each: a condition on a cycle and the one before; of a requirement with the monitor that it reads.
+In: declarations. Out: a `Property` for each: a condition on a cycle and the one before; of what is over time with its monitor.
 """
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.expressions.previous import cycles_of
@@ -13,7 +13,7 @@ from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import boolean, without_before
 from rcsc.lang.expressions.types import constant
 from rcsc.lang.leaves import one_earlier, read_by
-from rcsc.lang.model import Apply, Bool, Expr, Int, Op, Property
+from rcsc.lang.model import BEFORE, Apply, Bool, Expr, Int, Kind, Op, Property, VariableName
 from rcsc.lang.over_time import monitor, past, requirement
 from rcsc.lang.resolve.declarations import requirements
 from rcsc.lang.syntax import tree
@@ -21,7 +21,7 @@ from rcsc.lang.syntax.spell import spell_expr, spell_required
 
 
 def stated(scope: Scope, declarations: Iterable[tree.Declaration]) -> tuple[Property, ...]:
-    """Resolve the properties and requirements among declarations, in order; those with an error are left out, and reported."""
+    """Resolve properties, requirements and assumptions over time, in order; those with an error are left out, and reported."""
     resolved: list[Property | None] = []
     for written in declarations:
         if isinstance(written, tree.PropertyDecl) and scope.claim(written.name, "assumption"):
@@ -148,21 +148,87 @@ _AS_OTHERS = {
 
 
 def _requirement(scope: Scope, written: tree.RequirementDecl) -> Property | None:
-    """Resolve a requirement over time; None after an error."""
-    scope.past = past.Past(written.name.text)
+    """Resolve a requirement or an assumption over time; None after an error."""
+    assumed = written.standing is not None
+    scope.past = past.Past(written.name.text, found=_own(scope) if assumed else frozenset())
     required, remembered = _required(scope, written), scope.past
     scope.past = None
     if required is None or not _remembers(scope, written, required):
         return None
+    if assumed:
+        if not _is_of_outside(scope, written, remembered, required):
+            return None
+        required = _as_found(remembered, required)
     if required.timing is requirement.Timing.AT_LAST and required.scope in requirement.ENDLESS:
         _without_end(scope, written)
         return None
     watch, kept = monitor.monitored(remembered, required)
+    if assumed and watch.owes != past.FALSE:
+        message = f"an assumption needs a bound: what `{written.timing}` asks for may always still come"
+        helps = "say until when: `within TIME,`, or `before CONDITION,`"
+        scope.report(Code.NOT_OF_OUTSIDE, message, written.name.span, helps)
+        return None
     name, doc, text = written.name, " ".join(written.doc), spell_required(written)
     named = requirements(scope, written.requirements)
     return Property(
-        name.text, kept, text, doc, name.span, requirements=named, monitor=watch, monitored=written.monitored
+        name.text, kept, text, doc, name.span, requirements=named, monitor=watch, monitored=written.monitored,
+        assumed=assumed,
+    )  # fmt: skip
+
+
+# An assumption over time is of what comes from outside. That goes by what the level has shown so far, and by nothing else: so what the
+# level keeps itself stands for its value as the cycle finds it, and whether a cycle is as assumed is told once its inputs are there.
+
+
+def _own(scope: Scope) -> frozenset[VariableName]:
+    """Return the leaves that the level writes."""
+    return frozenset(leaf.name for leaf in scope.leaves.values() if leaf.kind is not Kind.INPUT)
+
+
+def _as_found(remembered: past.Past, required: requirement.Requirement) -> requirement.Requirement:
+    """Have all conditions of an assumption read what the level writes as the cycle finds it."""
+    remembered.truths[:] = [(name, remembered.as_found(truth)) for name, truth in remembered.truths]
+    found = remembered.as_found
+    return replace(
+        required,
+        response=found(required.response),
+        condition=found(required.condition),
+        mode=found(required.mode),
+        stop=found(required.stop),
+        end=found(required.end),
     )
+
+
+def _is_of_outside(
+    scope: Scope, written: tree.RequirementDecl, remembered: past.Past, required: requirement.Requirement
+) -> bool:
+    """Return whether an assumption may be trusted, as far as its text tells; report why not."""
+    if written.standing in {"monitored", "proved"}:
+        message = f"an assumption over time is trusted: nothing shows that it is `{written.standing}`"
+        helps = "`assumed`, or `assumed monitored`, which runs watch, too; what a level has to keep is a `requirement`"
+        scope.report(Code.NOT_OF_OUTSIDE, message, written.name.span, helps)
+        return False
+    if not any(scope.leaves[name].kind is Kind.INPUT for name in _reads(remembered, required.response)):
+        message = f"`{spell_expr(written.response)}` is about no input: nothing from outside can keep it"
+        helps = "assume something of an input; what a level has to keep is a `requirement`"
+        scope.report(Code.NOT_OF_OUTSIDE, message, written.response.span, helps)
+        return False
+    return True
+
+
+def _reads(remembered: past.Past, condition: Expr) -> set[VariableName]:
+    """Return the leaves that a condition reads, also by what it remembers."""
+    truths, read, waiting = dict(remembered.truths), set[VariableName](), [condition]
+    hidden = {state.name for state in remembered.states}
+    seen = set[VariableName]()
+    while waiting:
+        for name in (VariableName(each.removeprefix(BEFORE)) for each in read_by(waiting.pop())):
+            if name not in hidden:
+                read.add(name)
+            elif name in truths and name not in seen:
+                seen.add(name)
+                waiting.append(truths[name])
+    return read
 
 
 def _required(scope: Scope, written: tree.RequirementDecl) -> requirement.Requirement | None:

@@ -195,9 +195,15 @@ class Build:
         return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
 
     def _requirement_decl(self, node: ParseNode) -> tree.RequirementDecl:
+        return self._over_time(node, self._kind(node.children, "WATCHED") is not None, None)
+
+    def _assume_over_time(self, node: ParseNode) -> tree.RequirementDecl:
+        standing = " ".join((self._kind(node.children, "STANDING") or "").split())
+        return self._over_time(node, standing.endswith("monitored"), standing)
+
+    def _over_time(self, node: ParseNode, monitored: bool, standing: str | None) -> tree.RequirementDecl:
         head = self._required(node)
-        monitored = self._kind(node.children, "WATCHED") is not None
-        kept = [part for part in node.children if getattr(part, "type", "") != "WATCHED"]
+        kept = [part for part in node.children if getattr(part, "type", "") not in {"WATCHED", "STANDING"}]
         name, *parts, response = (part for part in kept if self._rule(part) != "req")
         scope, asks, takes = (self._worded(parts, before) for before in ("in_", "asks_", "takes_"))
         mode, *end = scope[1]
@@ -216,6 +222,7 @@ class Build:
             end[0] if end else None,
             other[0] if other else None,
             monitored,
+            standing,
             **head,
         )
 

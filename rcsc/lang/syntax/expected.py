@@ -48,6 +48,7 @@ _WORDS = {
     "HELD": "`for`",
     "AT_ONCE": "`once`",
     "WATCHED": "`monitored`",
+    "_OVER_TIME": "`:`",
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
@@ -69,7 +70,7 @@ _CLASSES = {
 """The words of the terminals that are not called as their one word is."""
 _SYMBOLS = frozenset(
     "NAME INT REAL MASK GROUPS STRING EVENT ROW COMPARE ADD_OP MUL_OP LBRACE RBRACE LPAR RPAR LSQB RSQB COLON COMMA SEMICOLON SLASH STAR"
-    " CIRCUMFLEX DOT EQUAL MINUS".split()
+    " CIRCUMFLEX DOT EQUAL MINUS _OVER_TIME".split()
 )
 """Terminals that are no words, whatever they are called."""
 _STATUS = "a link says what its statuses mean: `status : TYPE done MEMBER failed MEMBER executing MEMBER`"
@@ -95,7 +96,7 @@ def expected(terminals: Iterable[str]) -> str:
             parts.append(word)
     if {"BOOL", "ARRAY"} <= names:
         names -= {"INT", "REAL", "ARRAY", "NAME", "_INT", "_REAL", "_SINGLE"}
-    single = sorted(_WORDS.get(name, f"`{name.lower()}`") for name in names)
+    single = sorted({_WORDS.get(name, f"`{name.lower()}`") for name in names})
     words = (parts + single)[:_MOST]
     return " or ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " or " + words[-1]
 

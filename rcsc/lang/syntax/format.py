@@ -69,8 +69,11 @@ def _declaration(declaration: tree.Declaration, width: int) -> Iterator[str]:
         case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
             yield _claim(declaration)
         case tree.RequirementDecl(name):
-            word = " monitored" * declaration.monitored
-            yield f"requirement {name.text}{word}{spell_req(declaration)} : {spell_required(declaration)}"
+            word = "requirement" if declaration.standing is None else "assume"
+            standing = " monitored" * declaration.monitored
+            if declaration.standing is not None:
+                standing = f" {declaration.standing}" if declaration.standing else ""
+            yield f"{word} {name.text}{standing}{spell_req(declaration)} : {spell_required(declaration)}"
         case tree.ProcedureDecl():
             yield from _procedure(declaration)
         case tree.OwnerDecl(name, members):

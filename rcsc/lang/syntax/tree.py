@@ -725,7 +725,10 @@ class Time:
 class RequirementDecl(Required):
     """`requirement name [monitored] [req ..] : [while c,] [when c,] within time, expr`: scope, trigger, timing and response.
 
+    So does `assume name [assumed [monitored]] [req ..] : ...` of what comes from outside.
+
     Attributes:
+        standing: The word of an assumption, "" for none; None of a requirement.
         scope: The words of the scope; "" for none. `mode` is its condition, and `end` that of its end, where it has one.
         trigger: "", "when" or "whenever"; `condition` stands after it.
         timing: The words of the timing, "at most" and "at least" without those after the time, "on" and "off"; `time`, `stop` or `times`
@@ -745,6 +748,7 @@ class RequirementDecl(Required):
     end: Expr | None = None
     times: Expr | None = None
     monitored: bool = False
+    standing: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

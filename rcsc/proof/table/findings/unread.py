@@ -165,7 +165,7 @@ def _read(program: Program) -> Iterator[str]:
 def _conditions(program: Program) -> Iterator[Expr]:
     for stated in (program.assumptions, program.invariants):
         yield from (each.condition for each in stated)
-    yield from (condition for each in program.properties for condition in each.about)
+    yield from (condition for each in program.stated for condition in each.about)
     for variable in program.variables:
         yield from (each for each in (variable.deferred_until, variable.counts) if each is not None)
     for level in program.levels:
