@@ -25,7 +25,7 @@ What a level assumes of its environment is the contract (`transition`):
   command of that order; (2) the number after the last one is not echoed; (3) once the last order is echoed, it stays so until another is
   given. Nothing about the status, about how long anything takes, or about reports on older orders; - of any level of which it says so in a
   declared assumption about one buffer: that what is published there is so (`contract.facts`);
-- of the database: the same question has the same answer;
+- of the database: the same question has the same answer; of what comes from outside, what is assumed over time (`contract.watched`);
 - of everything else: its declared range. What no level writes may also come as a value that is *refused*: that cycle takes nothing
   (`rcsc.lang.protocol.environment`), as often as the environment likes. Claims are proved of such an environment first. Only what is not
   proved there is proved once more as if nothing were refused, and then says so, whatever its kind (`proof.level`).

@@ -31,6 +31,7 @@ RESTING: Key = ("the command that rests ends", "", "")
 """What it rests on where the level above fails orders that are not answered in time."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
 GIVEN = "what another level writes is as it assumes"
+KEPT = "can always be kept"
 STANDS: Key = ("its report stands once it has answered", "", "")
 """What termination of a level above may rest on, where that reads more of it than echo and status."""
 """Sorts of claims that are no obligations of one cycle."""
@@ -198,6 +199,8 @@ def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> s
     words = phrases.get(need[1], " ".join(part for part in (sort, f"`{name}`" if name else "") if part))
     if sort == CONTRACT:
         words = f"what it takes in `{name}` is as it assumes"
+    elif sort == KEPT:
+        words = f"that assumption `{name}` {KEPT}"
     where = [f"level `{owner}`" if owner != level else "", f"table `{table}`" if table else ""]
     gone = ", not looked at" if claims is not None and need not in claims and need[1] not in phrases else ""
     return ": ".join([part for part in where if part] + [words]) + gone

@@ -12,7 +12,7 @@ An assumption that also speaks of what stands outside is trusted where that alon
 true, whatever the levels do. Example: `new_command implies not there` says something of `there`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from math import prod
@@ -92,13 +92,13 @@ def _at_the_writer(condition: Expr, record: str, output: str) -> Expr:
 def outside_values(condition: Expr, kinds: Mapping[str, Scalar]) -> Iterator[dict[str, Value]]:
     """Yield values of these leaves that may make the condition true; none where they are too many to try."""
     told = {part.value for part in parts(condition) if isinstance(part, Literal)}
-    choices = {name: _choices(kind, told) for name, kind in kinds.items()}
+    choices = {name: values_near(kind, told) for name, kind in kinds.items()}
     if prod(map(len, choices.values())) <= MOST_TRIED:
         for chosen in product(*choices.values()):
             yield dict(zip(choices, chosen, strict=True))
 
 
-def _choices(kind: Scalar, told: set[Value]) -> list[Value]:
+def values_near(kind: Scalar, told: Collection[Value]) -> list[Value]:
     """List all values of a type, or its ends and those by the constants of a condition."""
     low, high = key_bounds(kind)
     if isinstance(kind, Bool | Enum):

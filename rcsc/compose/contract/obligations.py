@@ -10,10 +10,11 @@ from enum import StrEnum
 from itertools import combinations
 from typing import TypeAlias
 
-from rcsc.compose.contract.claims import SAFE
+from rcsc.compose.contract.claims import KEPT, SAFE
 from rcsc.compose.contract.environment import Above, Below, leaves_under
 from rcsc.compose.contract.properties import invariants, kept_within, owed, properties
 from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, successor
+from rcsc.compose.contract.watched import can_be_kept
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
@@ -53,6 +54,9 @@ class Sort(StrEnum):
     INVARIANT = "invariant"
     PROPERTY = "property"
     REQUIREMENT = "requirement"  # over time: a condition on a cycle and the ghosts of its monitor
+    KEPT = (
+        KEPT  # what is assumed over time of what comes from outside: no cycle leads to where nothing keeps it
+    )
     ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
     SAFE = SAFE[0]
@@ -73,6 +77,7 @@ BROKEN = {
     Sort.INVARIANT: "invariant `{}` does not hold",
     Sort.PROPERTY: "property `{}` is broken",
     Sort.REQUIREMENT: "requirement `{}` is broken",
+    Sort.KEPT: "no inputs were found that keep assumption `{}` in the cycle after it",
     Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
     Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
@@ -130,6 +135,8 @@ class Obligation:
         """Its text in one line, without the table."""
         if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT}:
             return f"{self.sort.value} `{self.name}`"
+        if self.sort is Sort.KEPT:
+            return f"assumption `{self.name}` {self.sort.value}"
         if self.lines:
             return "lines {} do not both match".format(" and ".join(f"`{line}`" for line in self.lines))
         return f"{self.sort.value}: `{self.name}`" if self.name else self.sort.value
@@ -403,11 +410,13 @@ def _rests(ts: TransitionSystem, table: Table) -> bool:
 
 
 def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """State the invariants and properties of the program, and the facts that it owes other levels."""
+    """State the invariants and properties of the program, that its assumptions can be kept, and the facts that it owes other levels."""
     for name, holds in invariants(ts.program, cycle):
         yield Obligation(Sort.INVARIANT, "", name, holds)
     for stated, holds in properties(ts.program, cycle):
         yield Obligation(Sort(stated.word), "", stated.name, holds)
+    for name, holds in can_be_kept(ts.program, cycle.after):
+        yield Obligation(Sort.KEPT, "", name, holds)
     for name, holds in owed(ts.links, cycle):
         yield Obligation(Sort.OWED, "", name, holds)
     if ts.safety.within:

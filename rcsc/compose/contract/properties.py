@@ -199,7 +199,7 @@ def _stated_conditions(ts: TransitionSystem) -> list[Expr]:
     program = ts.program
     return [
         *(invariant.condition for invariant in program.invariants),
-        *(stated.condition for stated in program.properties),
+        *(stated.condition for stated in program.stated),
         *_looked_at(program),
         *(fact.condition for fact in ts.links.owes),
     ]

@@ -13,7 +13,7 @@ from rcsc.compose.contract.facts import believed, outside_values
 from rcsc.compose.contract.watched import GHOST as GHOST  # noqa: PLC0414  # of a cycle's ghosts, too
 from rcsc.compose.contract.watched import REFUSED as REFUSED  # noqa: PLC0414  # as above
 from rcsc.compose.contract.watched import Leaves as Leaves  # noqa: PLC0414  # as above
-from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, monitors
+from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, kept, monitors
 from rcsc.lang.interpret import chosen_table
 from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import (  # fmt: skip
@@ -105,7 +105,7 @@ class Cycle:
     Attributes:
         before: Every leaf and ghost as the last cycle left it; inputs as last taken.
         taken: The inputs of this cycle.
-        contract: The condition on the environment; `undeclared`, without assumptions that tables declare.
+        contract: The condition on the environment, assumptions over time included; `undeclared`, without those that tables declare.
         middle: Every leaf as the table sees it.
         tables: Each table that may run last; `stages`, each that may run before it, and `every`, all.
         seen: Every leaf as the tables of each stage see it, in order.
@@ -238,8 +238,8 @@ class TransitionSystem:
         self.trusted = self._of_the_environment()
 
     def _looked_back_at(self) -> frozenset[str]:
-        """Find the inputs that a property looks back at, which a refused cycle left as they came."""
-        read = {str(name) for stated in self.program.properties for name in spoken_of(stated)}
+        """Find the inputs that a property or an assumption looks back at, which a refused cycle left as they came."""
+        read = {str(name) for stated in self.program.stated for name in spoken_of(stated)}
         return frozenset(leaf for leaf in self.inputs if str(earlier(leaf)) in read)
 
     def _of_outside(self) -> Iterator[Variable]:
@@ -410,7 +410,14 @@ class TransitionSystem:
             cycle = self._or_refused(cycle, values.variable(f"{_REFUSED}{suffix}", Bool()))
         refusals = cycle.refusals(self.inputs, suffix)
         watched = ghosts_after(self.program, before, cycle.after, refusals, cycle.idle)
-        return replace(cycle, after={**cycle.after, **watched}) if watched else cycle
+        if not watched:
+            return cycle
+        cycle = replace(cycle, after={**cycle.after, **watched})
+        if not self.program.environment:
+            return cycle
+        as_assumed = kept(self.program, before, cycle.after)
+        contract, undeclared = (values.both(one, as_assumed) for one in (cycle.contract, cycle.undeclared))
+        return replace(cycle, contract=contract, undeclared=undeclared)
 
     def _or_refused(self, cycle: Cycle, untaken: Node) -> Cycle:
         """Return the cycle with the case that an input is refused: then it takes nothing (`Event.INPUT_REFUSED`).

@@ -13,13 +13,15 @@ from random import Random
 from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.given import at_random
 from rcsc.compose.contract.transition import EARLY, GHOST, TransitionSystem
-from rcsc.compose.contract.watched import begin, step
+from rcsc.compose.contract.watched import as_assumed, begin, step, told_of
 from rcsc.lang.interpret import UNDEFINED, Fault, Outcome, cycle, holds, initial
 from rcsc.lang.model import Enum, Program, Standing, Value, key_bounds, value_of_key
 from rcsc.lang.restart import NUMBERS
 
 TRIES = 8
 """How often inputs are drawn for one cycle, until what is taken for granted of them is so."""
+NAMED = 0.5
+"""How often a value is drawn of those that assumptions over time name: else few cycles keep one that asks for one of many."""
 DEEPER = 100_000
 """Leaves times cycles of walks to lines that random ones do not reach: thousands of cycles of a small level, hundreds of a large one."""
 HELD, DRAWN = 5_000, 12
@@ -46,9 +48,11 @@ class Walk:
     latest: set[tuple[str, str]] = field(default_factory=set)
     holds: bool = False
     _program: Program = field(init=False, repr=False)
+    _told: Mapping[str, list[Value]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._program = _watching(self.ts)
+        self._told = told_of(self.ts.program)
         self.now = dict(initial(self.ts.program))
         kinds = self.ts.kinds
         self.ghosts = {name: value_of_key(kinds[name], 0) for name in kinds if name.startswith(GHOST)}
@@ -63,12 +67,10 @@ class Walk:
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
         """Yield the state after each cycle; stop at a fault, which the proof has to find, or where no granted inputs are found."""
         for _ in range(cycles):
-            before = dict(self.now)
             outcome = self._cycle()
             if outcome is None or outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot
-            self.watched = step(self.ts.program, self.watched, before, self.now)
             self.latest = set(self.ts.lines_before(self.now))
             if outcome.line is not None:
                 self.latest.add((self.ts.table_of(self.now), str(outcome.line)))
@@ -89,15 +91,18 @@ class Walk:
 
     def _cycle(self) -> Outcome | None:
         """Run a cycle whose inputs are as is taken for granted; None if that is not found, or where an operation is not defined."""
-        now, ghosts = self.now, self.ghosts
-        trusts = bool(self.ts.trusted or self.ts.links.given)
+        now, ghosts, watched = self.now, self.ghosts, self.watched
+        program = self.ts.program
+        trusts = bool(self.ts.trusted or self.ts.links.given or program.environment)
         for _ in range(TRIES if trusts and not self.holds else 1):
             self.now, self.ghosts = dict(now), dict(ghosts)
             self._take()
             try:
                 with at_random(self.ts.program, self.random):
                     outcome = cycle(self._program, self.ts.level, self.now)
-                if not trusts or self._as_granted(outcome):
+                left = step(program, watched, now, outcome.snapshot)
+                if not trusts or (self._as_granted(outcome) and as_assumed(program, watched, left)):
+                    self.watched = left
                     return outcome
             except UNDEFINED:
                 return None
@@ -124,7 +129,10 @@ class Walk:
         links = self.ts.links
         if not self.holds:
             for leaf in links.free:
-                self.now[leaf] = self._any(leaf)
+                told = self._told.get(leaf)
+                self.now[leaf] = (
+                    self.random.choice(told) if told and self.random.random() < NAMED else self._any(leaf)
+                )
             if links.above is not None:
                 self._order()
             for below in links.below:

@@ -13,7 +13,7 @@ from rcsc.compose.contract.given import ExternAnswer, scripted
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.properties import invariant_kept, property_kept
 from rcsc.compose.contract.transition import EARLY, Cycle, Leaves, TransitionSystem
-from rcsc.compose.contract.watched import begin, is_ghost, step
+from rcsc.compose.contract.watched import as_assumed, begin, is_ghost, step
 from rcsc.lang.interpret import (
     ExternError,
     Fault,
@@ -265,9 +265,9 @@ def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
 
 
 def as_declared(ts: TransitionSystem, step: CycleRun) -> bool:
-    """Return whether all trusted assumptions held where the tables ran: the search may have left that open."""
+    """Return whether all trusted assumptions held, where the tables ran or over time: the search may have left that open."""
     failed = {*step.failed, *(name for stage in step.stages for name in stage.failed)}
-    return not failed & ts.trusted
+    return not failed & ts.trusted and as_assumed(ts.program, step.found, step.left)
 
 
 def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
@@ -310,6 +310,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
             | Sort.ANSWERED
             | Sort.PAUSES
             | Sort.DEFERRED
+            | Sort.KEPT
             | Sort.OWED
             | Sort.ENDS
             | Sort.DONE_STAYS

@@ -14,6 +14,7 @@ from rcsc.compose.contract.beginning import Starts
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, counts_on, obligations, pairs
 from rcsc.compose.contract.properties import invariant_kept
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.watched import can_be_kept
 from rcsc.compose.counterexample.applied import Texts
 from rcsc.compose.counterexample.consequence import Consequence, consequences
 from rcsc.compose.counterexample.finding import Finding, of_trace, supposed
@@ -203,10 +204,16 @@ def _waits_for_ever(
 
 
 def _as_it_begins(ts: TransitionSystem, obligation: Obligation) -> Iterator[str]:
-    """Yield notes where initial or restart values break an invariant, or may give an order a number that was used before."""
+    """Yield notes where what it begins with breaks an invariant, gives an order an old number, or leaves nothing to keep an assumption."""
     for below in ts.links.below:
         if (obligation.sort, obligation.name) == (Sort.NEXT_NUMBER, below.order) and not counts_on(ts, below):
             yield f"after a restart `{below.number}` may be the number of an earlier order: it does not count on from that"
+    if obligation.sort is Sort.KEPT:
+        begins = {"in the first cycle": ts.initial(), "in the first cycle after a restart": ts.restarted()}
+        for where, leaves in begins.items():
+            can = dict(can_be_kept(ts.program, leaves))[obligation.name]
+            if can.known and not can.low:
+                yield f"nothing keeps it {where}, and no other follows"
     for finding in at_first(ts.program) if obligation.sort is Sort.INVARIANT else ():
         if finding.message.endswith(f"`{obligation.name}`") and finding.code is Code.INVARIANT_INITIAL:
             yield " ".join((finding.message, *(f"({note})" for note in finding.notes)))

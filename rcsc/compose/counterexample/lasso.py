@@ -102,8 +102,9 @@ def _due(ts: TransitionSystem, cycles: Sequence[Cycle]) -> Iterator[Node]:
 
 
 def _moving(ts: TransitionSystem) -> set[str]:
-    """Return the leaves that go on: numbers of orders, and their echoes; and monitors, which no level reads."""
-    return {leaf for below in ts.links.below for leaf in (below.number, below.echo)} | set(begin(ts.program))
+    """Return the leaves that go on: numbers of orders, and their echoes; and monitors, but of what the environment has to keep."""
+    claimed = begin(replace(ts.program, environment=()))
+    return {leaf for below in ts.links.below for leaf in (below.number, below.echo)} | set(claimed)
 
 
 def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso | NotReproducedError:

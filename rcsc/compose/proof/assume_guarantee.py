@@ -133,7 +133,9 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
         for obligation, _ in proof.verdicts
         if obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
     ]
-    trusts = [f"assumption `{assumption}` of level `{name}`{DECLARED}" for assumption in sorted(ts.trusted)]
+    needs += [obligation.key for obligation, _ in proof.verdicts if obligation.sort is Sort.KEPT]
+    declared = sorted({*ts.trusted, *(stated.name for stated in ts.program.environment)})
+    trusts = [f"assumption `{assumption}` of level `{name}`{DECLARED}" for assumption in declared]
     if ts.trusted:
         trusts.append(f"level `{name}` can be as its tables declare in every state that it comes to")
     trusts += [

@@ -17,6 +17,7 @@ from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obliga
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.watched import can_be_kept
 from rcsc.compose.exact.portfolio import helped
 from rcsc.compose.exact.said import Found
 from rcsc.compose.invariant.confirm import Confirmation, answer
@@ -570,6 +571,7 @@ def _verdicts(
         *(inference.beginning(first) for first in inference.firsts),
     ]
     believed = _believed(ts, inference, invariant.clauses, solvers)
+    kept_at_first = _kept_at_first(ts, inference)
     for at, obligation in enumerate(wanted):
         if obligation.key in shown:
             yield obligation, shown[obligation.key]
@@ -578,11 +580,26 @@ def _verdicts(
             yield obligation, Verdict.NOT_PROVED
             continue
         answers = {answer(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
+        if obligation.sort is Sort.KEPT:
+            answers |= {each.check() for each in kept_at_first.values()}
         if answers == {Answer.UNSATISFIABLE}:
             trusted = obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
             yield obligation, believed[obligation.table] if trusted else Verdict.PROVED
         else:
             yield obligation, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
+
+
+def _kept_at_first(ts: TransitionSystem, inference: Confirmation) -> dict[str, Solver]:
+    """Ask whether a level can begin where nothing keeps what is assumed over time: no cycle would follow, and all be proved of none."""
+    questions = {}
+    for at, first in enumerate(inference.firsts if ts.program.environment else ()):
+        broken = [
+            inference.keyed.term(values.negation(can)) for _, can in can_be_kept(ts.program, first.before)
+        ]
+        solver = Solver(inference.limits)
+        solver.add(*inference.keyed.ranges, smt.any_of(broken))
+        questions[f"kept at {'restart' if at else 'first'}"] = solver
+    return questions
 
 
 def _believed(
@@ -684,6 +701,8 @@ def _certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits) -> dic
     for name, first in firsts.items():
         wanted = [obligation for obligation in obligations(ts, first) if obligation.key in proved]
         scripts[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
+    if any(sort is Sort.KEPT for sort, _, _ in proved):
+        scripts |= {name: each.script() for name, each in _kept_at_first(ts, asked).items()}
     every = [obligation for obligation in obligations(ts, cycle) if obligation.key in proved]
     for sort in dict.fromkeys(obligation.sort for obligation in every):
         wanted = [obligation for obligation in every if obligation.sort is sort]

@@ -503,10 +503,17 @@ def least_power(holds: Callable[[int], bool]) -> int | None:
 
 
 def owned(program: Program) -> list[tuple[str, Scalar]]:
-    """List the numbers that the level keeps, and their pending values."""
+    """List the numbers that the level keeps, and their pending values; and how long what is assumed over time has been waited for."""
     numbers = [v for v in program.variables if v.kind is Kind.STATE and isinstance(v.type, Int | Real)]
     later = [(str(pending(v.name)), v.type) for v in numbers if v.deferred_until is not None]
-    return [*((str(v.name), v.type) for v in numbers), *later]
+    kept = (
+        state
+        for stated in program.environment
+        if stated.monitor is not None
+        for state in stated.monitor.states
+    )
+    times = [(str(state.name), state.type) for state in kept if isinstance(state.type, Int)]
+    return [*((str(v.name), v.type) for v in numbers), *later, *times]
 
 
 def parts(steps: set[LinePair]) -> list[Part]:

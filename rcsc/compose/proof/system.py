@@ -41,8 +41,9 @@ from rcsc.compose.proof.level import (
 )
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
+from rcsc.lang.leaves import spoken_of
 from rcsc.lang.meaning import with_stops
-from rcsc.lang.model import AssumptionName, Program
+from rcsc.lang.model import BEFORE, AssumptionName, Kind, Program
 from rcsc.lang.project import Loaded, load
 from rcsc.run.description import BadDescription, Description, description, places
 from rcsc.run.links import check_links
@@ -53,6 +54,12 @@ SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.
 
 class NoProgramError(CodedError):
     """A level's tables cannot be read, or are not in order; says which."""
+
+
+class NotOfOutsideError(NoProgramError):
+    """An assumption over time is about what does not come from outside."""
+
+    code = Code.NOT_OF_OUTSIDE
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +143,8 @@ def transition_systems_of(
     check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
     _check_ranks(every)
+    for name, program in programs.items():
+        _check_environment(program, every[name])
     every = with_facts(every, programs)
     systems = {}
     for name, program in programs.items():
@@ -144,6 +153,28 @@ def transition_systems_of(
             raise NoProgramError(f"program `{program.name}` has no level `{name}`")
         systems[name] = TransitionSystem(program, level, _narrowed(every[name], every, programs))
     return systems
+
+
+def _check_environment(program: Program, links: Links) -> None:
+    """Check that assumptions over time read no input that follows the protocol, or that a level or the database writes.
+
+    Raises:
+        NotOfOutsideError: One does.
+    """
+    inputs = {str(v.name) for v in program.variables if v.kind is Kind.INPUT}
+    for stated in program.environment:
+        for leaf in sorted({str(name).removeprefix(BEFORE) for name in spoken_of(stated)} & inputs):
+            written = links.written_as(leaf)
+            if written is None and leaf in links.free and not any(leaf in one.keys for one in links.asked):
+                continue
+            who = (
+                "an order, a report, or an answer of the database"
+                if written is None
+                else f"what level `{written[1]}` writes"
+            )
+            raise NotOfOutsideError(
+                f"assumption `{stated.name}` of level `{links.level}` is about `{leaf}`, which is {who}: it takes no assumption over time"
+            )
 
 
 def _check_ranks(every: Mapping[str, Links]) -> None:

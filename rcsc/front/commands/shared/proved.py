@@ -12,15 +12,19 @@ from rcsc.base.diagnostics import report
 from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.claims import (
     AGAIN,
+    DECLARED,
     ENDING,
     IN_RANGE,
     RUNS,
     UNREACHED,
+    Closed,
     Key,
     Need,
+    Trust,
     declared,
     of_refusals,
     spelled,
+    trust_of,
 )
 from rcsc.compose.contract.obligations import Sort, pause_of
 from rcsc.compose.contract.transition import Leaves, TransitionSystem
@@ -31,6 +35,7 @@ from rcsc.compose.proof.notices import condition_of
 from rcsc.compose.proof.ranking import RisingLine
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.proof.termination import Ending
+from rcsc.lang.model import WATCHED
 from rcsc.proof.solvers.smtlib import CVC5_STEPS, cvc5_refutes
 
 
@@ -98,7 +103,18 @@ def in_context(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> I
                 if ending.proved and closed.lacks
                 else ""
             )
-            yield f"  {ending.table} {_ends(ending)}{only}"
+            trusts = report.trusting(_over_time(whole, closed)) if ending.proved and not only else ""
+            yield f"  {ending.table} {_ends(ending)}{only}{trusts}"
+
+
+def _over_time(whole: SystemProof, closed: Closed) -> list[str]:
+    """List the assumptions over time that a claim trusts."""
+    said = [(trust, *trust_of(trust)) for trust in closed.trusts]
+    return [
+        trust.removesuffix(DECLARED)
+        for trust, kind, level, name in said
+        if kind == Trust.DECLARED.name and (level, (Sort.KEPT, "", name)) in whole.closed
+    ]
 
 
 def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
@@ -247,7 +263,10 @@ def _counted(line: str, counters: Sequence[RisingLine]) -> str:
 
 def _moves(rising: RisingLine) -> str:
     by = "" if rising.least is None else f" by at least {rising.least:.2g}"
-    return f"`{rising.counter}` {'falls' if rising.falls else 'rises'}{by}"
+    counter = f"`{rising.counter}`"
+    if rising.counter.startswith(WATCHED):
+        counter = f"the time of assumption `{rising.counter.split()[1]}`"
+    return f"{counter} {'falls' if rising.falls else 'rises'}{by}"
 
 
 def assumptions(proof: SystemProof) -> str:
@@ -258,8 +277,21 @@ def assumptions(proof: SystemProof) -> str:
         for obligation, _ in level.verdicts
         if obligation.sort is Sort.ASSUMPTION
     ]
-    if not claims:
-        return "the tables assume nothing"
+    over_time = [
+        proof.of(level.level, obligation.key)
+        for level in proof.levels
+        for obligation, _ in level.verdicts
+        if obligation.sort is Sort.KEPT
+    ]
+    if over_time:
+        kept = sum(closed.proved for closed in over_time)
+        claims_ = _of_tables(claims) if claims else "the tables assume nothing"
+        return f"{claims_}; assumptions over time: {len(over_time)}, {kept} of them can always be kept"
+    return _of_tables(claims) if claims else "the tables assume nothing"
+
+
+def _of_tables(claims: Sequence[Closed]) -> str:
+    """Return the number of assumptions of tables, by their verdicts."""
     believed = sum(closed.proved and closed.verdict.value != "proved" for closed in claims)
     good = sum(closed.proved for closed in claims) - believed
     rest = len(claims) - good - believed

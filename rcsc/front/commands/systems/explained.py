@@ -16,6 +16,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.watched import kept_with
 from rcsc.compose.counterexample.consequence import MOST, Consequence, How, spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, runs_on_executors
 from rcsc.compose.counterexample.finding import (
@@ -31,7 +32,7 @@ from rcsc.compose.counterexample.finding import (
 from rcsc.compose.counterexample.trace import USUAL
 from rcsc.compose.proof.eventually import waiting
 from rcsc.front.commands.shared.stopped import attach, say_error
-from rcsc.lang.model import Int, Kind
+from rcsc.lang.model import Int, Kind, Property
 
 ALIKE = 2
 """Consequences of one kind that are shown with their runs; others differ in a reason only, and are told in a line."""
@@ -62,9 +63,12 @@ def say_explanation(
     elif explanation.warns:
         say_error(Code.ENDLESS, f"{where}: not shown: {explanation.obligation.shown}", "warning")
     else:
-        say_error(Code.NOT_COMPOSED, f"{where}: not proved: {explanation.obligation.shown}")
+        code = Code.CANNOT_BE_KEPT if explanation.obligation.sort is Sort.KEPT else Code.NOT_COMPOSED
+        say_error(code, f"{where}: not proved: {explanation.obligation.shown}")
     if stated := _stated(systems, explanation):
         attach("note", f"it says: {stated}")
+    for other in _of_the_same_inputs(systems, explanation):
+        attach("note", f"and `{other.name}`, which is about the same inputs: {other.text}")
     for line in explanation.beside if not explanation.undefined else ():
         attach("note", line)
     if explanation.finding is not None and not explanation.beside:
@@ -83,17 +87,30 @@ def say_explanation(
             "no first cycle can be as the tables declare, or no later one, or none that runs this table: "
             "what rests on it says nothing",
         )
-    elif cycles and not explanation.beside:
+    elif cycles and not explanation.beside and not _never_begins(explanation):
         attach("note", _no_run(systems[explanation.level], explanation, settings))
         _say_supposed(systems, explanation)
     _say_notes(explanation)
-    for line in (*explanation.helps, *next_steps(systems[explanation.level], explanation, settings)):
+    steps = next_steps(systems[explanation.level], explanation, settings)
+    for line in (*explanation.helps, *_restricts_less(explanation), *steps):
         attach("help", line)
     if explanation.together:
         attach("note", explanation.together)
     if explanation.others:
         attach("note", f"of {counted(len(explanation.others), 'other pair')} of lines no such run was found")
     _say_logs(explanation)
+
+
+def _restricts_less(explanation: Explanation) -> tuple[str, ...]:
+    """Return the help for an assumption over time that cannot always be kept; none for any other claim."""
+    if explanation.obligation.sort is not Sort.KEPT:
+        return ()
+    return ("have it restrict less: whatever the level does must leave inputs that keep it",)
+
+
+def _never_begins(explanation: Explanation) -> bool:
+    """Return whether no run breaks the claim because none begins: already the first cycle keeps no assumption."""
+    return explanation.obligation.sort is Sort.KEPT and bool(explanation.notes)
 
 
 def _no_run(ts: TransitionSystem, explanation: Explanation, settings: TraceSettings) -> str:
@@ -114,7 +131,12 @@ def _no_run(ts: TransitionSystem, explanation: Explanation, settings: TraceSetti
 
 def next_steps(ts: TransitionSystem, explanation: Explanation, settings: TraceSettings) -> list[str]:
     """List what to do about a claim that is neither proved nor broken by a run, with names and values to type."""
-    if explanation.finding is not None or explanation.beside or not settings.most:
+    if (
+        explanation.finding is not None
+        or explanation.beside
+        or not settings.most
+        or _never_begins(explanation)
+    ):
         return []
     state = {} if explanation.supposed is None else state_of(ts, explanation.supposed)
     steps = []
@@ -167,14 +189,23 @@ def _say_logs(explanation: Explanation) -> None:
 
 
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
-    """Return the property's source text, or "" where it is none."""
-    if explanation.obligation.sort not in {Sort.PROPERTY, Sort.REQUIREMENT}:
+    """Return the source text of a property, requirement or assumption over time, or "" where it is none."""
+    if explanation.obligation.sort not in {Sort.PROPERTY, Sort.REQUIREMENT, Sort.KEPT}:
         return ""
     return next(
         stated.text
-        for stated in systems[explanation.level].program.properties
+        for stated in systems[explanation.level].program.stated
         if stated.name == explanation.obligation.name
     )
+
+
+def _of_the_same_inputs(
+    systems: Mapping[str, TransitionSystem], explanation: Explanation
+) -> Sequence[Property]:
+    """List the assumptions over time with which one has to be kept; none for any other claim."""
+    if explanation.obligation.sort is not Sort.KEPT:
+        return ()
+    return kept_with(systems[explanation.level].program, explanation.obligation.name)
 
 
 def _say_notes(explanation: Explanation) -> None:

@@ -300,7 +300,7 @@ def _of_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> It
                 as_declared = "" if proved else f"{declared[obligation.name]}: "
                 together = " of the levels together" if verdict in {"not proved", "undecided"} else ""
                 yield f"  {obligation.table:28} {obligation.name:24} {as_declared}{verdict}{together}"
-        elif sort in {Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT}:
+        elif sort in {Sort.INVARIANT, Sort.PROPERTY, Sort.REQUIREMENT, Sort.KEPT}:
             for obligation in obligations:
                 yield (
                     f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
