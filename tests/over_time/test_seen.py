@@ -79,6 +79,43 @@ def test_diff_tells_what_changed(
     assert "requirement" not in capsys.readouterr().out
 
 
+SLOW = 'assume slow assumed req "SR-8" : at least 3 cycles apart, asked\n'
+
+
+def test_an_assumption_is_shown_where_requirements_are(
+    door: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    door.write_text(DOOR.replace("requirement", f"{SLOW}requirement"), encoding="utf-8")
+    assert rcsc(["trace", str(door), "--find", "SR-8"]) == 0
+    text = capsys.readouterr().out
+    assert "door.rcs:4: assumption slow: at least 3 cycles apart, asked" in text
+    program = program_of(door.read_text(encoding="utf-8"))
+    assert "assumption slow" in Uses(program).read[spoken_of(program.environment[0])[0]]
+    other = door.with_name("other.rcs")
+    for edit, said in (
+        (
+            ("at least 3", "at least 4"),
+            "assumption `slow` at least 3 cycles apart, asked -> at least 4 cycles apart, asked",
+        ),
+        (("slow assumed", "slow assumed monitored"), "assumption `slow` now monitored"),
+        (('assume slow assumed req "SR-8"', "requirement slow"), "assumption, now requirement"),
+        ((SLOW, ""), "assumption `slow` gone: at least 3 cycles apart, asked"),
+    ):
+        other.write_text(door.read_text(encoding="utf-8").replace(*edit), encoding="utf-8")
+        rcsc(["diff", str(door), str(other)])
+        assert said in " ".join(capsys.readouterr().out.split())
+
+
+def test_editors_tell_what_an_assumption_is() -> None:
+    text = DOOR.replace("requirement", f"{SLOW}requirement")
+    loaded = load(["-"], stdin=text, stdin_name="door.rcs")
+    names = Names(loaded.files, loaded.sources, program_of(text))
+    every = list(occurrences(loaded.files["door.rcs"]))
+    said = {one.text: about(names, one, {}) for one in every}
+    assert "assumption over time, of what comes from outside: trusted by `rcsc prove`" in said["slow"]
+    assert "`slow` (assumed over time)" in said["asked"]
+
+
 def test_editors_know_its_names() -> None:
     loaded = load(["-"], stdin=DOOR, stdin_name="door.rcs")
     names = Names(loaded.files, loaded.sources, program_of(DOOR))

@@ -117,6 +117,89 @@ def test_a_campaign_watches_every_requirement_and_names_the_cycle(
     assert "l: some_time" not in text
 
 
+ASSUMED = DOOR.replace(
+    "requirement in_time monitored",
+    "assume brief assumed monitored : whenever asked, at once not was asked\nrequirement in_time monitored",
+)
+
+
+def test_a_run_tells_a_plant_that_breaks_what_is_assumed(
+    system: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plant asks from cycle 6 on: no level is at fault."""
+    (system / "door.rcs").write_text(ASSUMED, encoding="utf-8")
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python"]) == 1
+    text = said(capsys)
+    assert "level `l`, cycle 7: by what comes from outside, assumption `brief` is broken" in text
+    assert "what is proved trusting it says nothing of this cycle, nor of any later one" in text
+    log = str(system / ".rcsc-cache" / "door.mcap")
+    assert (
+        rcsc(["replay", log, "--system", str(system), "--executor", "python", "--find", "not l.brief"]) == 0
+    )
+    assert said(capsys).startswith("cycle 7,")
+    unwatched = ASSUMED.replace("assumed monitored", "assumed")
+    (system / "door.rcs").write_text(unwatched, encoding="utf-8")
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python"]) == 1
+    assert "assumption `" not in said(capsys)
+
+
+BRIEF = ASSUMED.replace("when asked, within 1 cycles, given", "never waited > 1")
+"""What is required follows from what is assumed."""
+
+
+def test_in_a_campaign_what_a_level_does_after_the_plant_broke_an_assumption_is_no_fault_of_it(
+    system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (system / "door.rcs").write_text(BRIEF, encoding="utf-8")
+    command = [
+        "campaign",
+        str(system),
+        "--episodes",
+        "4",
+        "--seed",
+        "1",
+        "--executor",
+        "python",
+        "--workers",
+        "1",
+    ]
+    assert rcsc([*command, "--save", str(tmp_path / "found")]) == 1
+    text = said(capsys)
+    assert (
+        "`l: assumption brief` does not hold: what comes from outside does not keep `whenever asked, at once not was asked`"
+        in text
+    )
+    assert "l: in_time` does not hold" not in text
+
+
+def test_where_no_plant_is_given_an_episode_that_breaks_an_assumption_is_excused(
+    system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (system / "door.rcs").write_text(BRIEF, encoding="utf-8")
+    path = system / "system.toml"
+    path.write_text(path.read_text(encoding="utf-8").partition("[plant]")[0], encoding="utf-8")
+    command = [
+        "campaign",
+        str(system),
+        "--episodes",
+        "30",
+        "--seed",
+        "1",
+        "--executor",
+        "python",
+        "--workers",
+        "1",
+    ]
+    status = rcsc([*command, "--save", str(tmp_path / "found")])
+    text = said(capsys)
+    assert (status, "does not hold:" in text) == (0, False), text
+    free = BRIEF.replace(BRIEF.splitlines()[3], "")
+    (system / "door.rcs").write_text(free, encoding="utf-8")
+    assert "assume" not in free
+    assert rcsc([*command, "--save", str(tmp_path / "found")]) == 1
+    assert "`l: in_time` does not hold" in said(capsys)
+
+
 def test_what_a_log_lacks_is_not_looked_at_and_programs_are_read_from_their_source(
     system: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

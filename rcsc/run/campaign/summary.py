@@ -31,6 +31,7 @@ _KINDS = {
     "STANDS": "answers stand",
     "PROPERTY": "properties",
     "REQUIREMENT": "requirements over time",
+    "KEPT": "assumptions that can be kept",
     "ENDS": "commands end",
     "CONTRACT": "agreements",
     "SAFE": "values in range",

@@ -18,7 +18,8 @@ dock,
 Out: an `EpisodeOutcome`. In each cycle it is asked whether exactly one line matched, every assumption held, every order was taken once and
 answered for good, every command ends in time once nothing goes wrong, and whether the `property` declarations of the tables and the
 plant's own methods with the result `Property` hold. Only an older value that comes again breaks what the proofs rest on; what follows
-from it is *excused*, with the fault that explains it, and so is what a false reading makes untrue of an assumption about it.
+from it is *excused*, with the fault that explains it, and so is what a false reading makes untrue of an assumption about it, and what comes
+after an assumption over time was broken.
 
 Where no plant is given, what comes from outside moves in its range, and whoever is ordered obeys (`subordinates`). What was proved of the
 levels is watched as well (`proved`).

@@ -24,6 +24,7 @@ class Broken(NamedTuple):
         level: Where it was seen; empty for what the plant itself says.
         leaves: That it is about, where only readings of these explain it; empty where any level that was misled does.
         proved: Whether it was proved: then only older values that came again explain it.
+        outside: Whether it was assumed over time of what comes from outside: no level is at fault, then or later.
     """
 
     property: str
@@ -31,6 +32,7 @@ class Broken(NamedTuple):
     level: str = ""
     leaves: tuple[str, ...] = ()
     proved: bool = False
+    outside: bool = False
 
 
 @dataclass(slots=True)

@@ -373,6 +373,10 @@ class Loop:
         if name == AGREE:
             self._end = "executors differ"  # no input explains that
         because = "" if name == AGREE else self._explained.because(broken)
+        if broken.outside:
+            if not because and not self._stage.outside:
+                because = "the episode gives what no plant says"
+            self._explained.misled.setdefault(broken.level, f"{name} was broken in cycle {tick}")
         if because:
             self._seen.excused.setdefault(name, Excused(name, tick, message, because))
         else:

@@ -167,6 +167,28 @@ class LevelRequirement:
             )
 
 
+@dataclass(slots=True)
+class EnvironmentKeeps:
+    """What a program assumes over time of what comes from outside: where it is broken, no level is at fault."""
+
+    level: str
+    its: LevelWatch
+
+    def watch(self, cycle: Cycle) -> Iterator[Broken]:
+        """Yield the values of the cycle that breaks it."""
+        level = cycle.levels[self.level]
+        if self.level in cycle.restarted:
+            self.its.watch.begin()
+        if level in cycle.ran and (shown := self.its.broken(cycle.left[self.level], level.values)):
+            stated = self.its.stated
+            text = f"what comes from outside does not keep `{stated.text}`: {shown}"
+            inputs = (
+                name for name in self.its.reads if level.sign.leaves[level.sign.index[name]].kind == "input"
+            )
+            name = f"{self.level}: assumption {stated.name}"
+            yield Broken(name, text, self.level, tuple(inputs), outside=True)
+
+
 def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
     """Return what a cycle left, with the inputs that were taken last: a refused one took none."""
     inputs = {at for at, leaf in enumerate(level.sign.leaves) if leaf.kind == "input"}
@@ -363,6 +385,8 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
     """
     watching: list[Property] = [ExecutorsAgree(), NoStateTableError(), Refuses(), AssumptionsHold(stand)]
     for name, program in stand.programs.items():
+        sign = stand.signs[name]
+        watching += [EnvironmentKeeps(name, watch_of(stated, sign)) for stated in program.environment]
         watching += [_of_level(name, stand.signs[name], stated) for stated in program.properties]
     for link in stand.links:
         sign = stand.signs[link.level]

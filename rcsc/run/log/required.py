@@ -1,6 +1,6 @@
-"""Requirements over time, watched in a run: of a log, cycle by cycle, and of whatever else gives a level's values before and after a cycle.
+"""What is required and assumed over time, watched in a run: of a log, cycle by cycle, and of what else gives values before and after one.
 
-In: a log, or values; resolved programs. Out: the cycles that break a requirement, with the values that they left. It is the monitor that
+In: a log, or values; resolved programs. Out: the cycles that break it, with the values that they left. It is the monitor that
 `rcsc prove` proves: executors have no part in it.
 """
 
@@ -78,25 +78,26 @@ def watch_of(stated: Property, sign: Signature) -> LevelWatch:
 
 @dataclass(frozen=True, slots=True)
 class BrokenRequirement:
-    """A cycle of a level that breaks a requirement; `shown`, the values that it left."""
+    """A cycle of a level that breaks a requirement, or an assumption; `shown`, the values that it left."""
 
     level: str
     name: str
     tick: int
     text: str
     shown: str
+    assumed: bool = False
 
 
 def requirements(system: Path, described: Description, *, monitored: bool) -> dict[str, tuple[Property, ...]]:
-    """Return the requirements over time of each level of a system that has some, all or those that every run watches.
+    """Return the requirements and assumptions over time of each level that has some, all or those that every run watches.
 
     Raises:
         BadDescription: A program is not there, or not in order.
     """
     known: dict[str, tuple[Property, ...]] = {}
     for spec in described.levels:
-        every = program_of(system, spec.program).properties
-        known[spec.name] = tuple(one for one in every if one.monitor and (one.monitored or not monitored))
+        every = program_of(system, spec.program).over_time
+        known[spec.name] = tuple(one for one in every if one.monitored or not monitored)
     return {level: stated for level, stated in known.items() if stated}
 
 
@@ -141,7 +142,8 @@ class WatchedTrack:
                     watch.watch.begin()  # begun anew, or nobody knows what was in between
                 if shown := watch.broken(self._before, values):
                     stated = watch.stated
-                    yield BrokenRequirement(level.name, stated.name, track.ticks[at], stated.text, shown)
+                    tick = track.ticks[at]
+                    yield BrokenRequirement(level.name, stated.name, tick, stated.text, shown, stated.assumed)
             self._before = values
 
 

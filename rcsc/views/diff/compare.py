@@ -149,7 +149,7 @@ def _places(program: Program) -> Iterator[tuple[str, tuple[str, ...]]]:
     yield from ((f"procedure `{one.name}`", one.requirements) for one in program.procedures)
     yield from ((f"assumption `{one.name}`", one.requirements) for one in program.assumptions)
     yield from ((f"invariant `{one.name}`", one.requirements) for one in program.invariants)
-    yield from ((f"{one.word} `{one.name}`", one.requirements) for one in program.properties)
+    yield from ((f"{one.word} `{one.name}`", one.requirements) for one in program.stated)
 
 
 def difference(

@@ -27,6 +27,7 @@ from rcsc.lang.model import (
     ProcedureName,
     Program,
     Property,
+    Standing,
     Statement,
 )
 from rcsc.run.link import Linked, rendered_system
@@ -339,6 +340,9 @@ class _Build:
             )
             states = assumption.doc or words(assumption.condition)
             yield self._named("assumption", assumption, states, relying, assumption.standing.value)
+        for stated in self.program.environment:
+            standing = Standing.WATCHED if stated.monitored else Standing.ASSUMED
+            yield self._named(stated.word, stated, stated.text, (), f"{standing.value}, over time")
         for invariant in self.program.invariants:
             states = invariant.doc or words(invariant.condition)
             yield self._named("invariant", invariant, states, (), KEPT)

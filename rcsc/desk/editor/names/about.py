@@ -10,8 +10,9 @@ from rcsc.desk.editor.grid import type_text
 from rcsc.desk.editor.names.find import Names
 from rcsc.desk.editor.names.index import Occurrence, Space
 from rcsc.desk.editor.values import Grid, Standing
-from rcsc.lang.leaves import Uses, read_by
+from rcsc.lang.leaves import Uses, read_by, spoken_of
 from rcsc.lang.model import (
+    BEFORE,
     Array,
     Call,
     Declared,
@@ -122,6 +123,11 @@ def _variable(program: Program, declared: Declared) -> Iterator[str]:
         for each in program.assumptions
         if leaves & set(map(str, read_by(each.condition)))
     ]
+    claims += [
+        f"`{each.name}` (assumed over time)"
+        for each in program.environment
+        if leaves & {leaf.removeprefix(BEFORE) for leaf in spoken_of(each)}
+    ]
     if claims:
         yield f"what is said of it: {_listed(claims)}"
 
@@ -214,6 +220,10 @@ def _claim(program: Program, name: str) -> Iterator[str]:
             yield f"assumption, {assumption.standing.value}" + (
                 f"; tables that rest on it: {_listed(users)}" if users else ""
             )
+    for each in program.environment:
+        if each.name == name:
+            watched = ", and watched by every run" if each.monitored else ""
+            yield f"assumption over time, of what comes from outside: trusted by `rcsc prove`{watched}"
     if any(invariant.name == name for invariant in program.invariants):
         yield "invariant: true at first and kept by every cycle; proved with the tables, which may rest on it"
     for each in program.properties:

@@ -164,7 +164,8 @@ class TimeLine(Concern):
 
     def _marks(self) -> Iterator[Mark]:
         for broken in self._broken():
-            text = f"requirement `{broken.level}.{broken.name}` is broken: {broken.shown}"
+            word = "assumption" if broken.assumed else "requirement"
+            text = f"{word} `{broken.level}.{broken.name}` is broken: {broken.shown}"
             yield Mark(broken.tick, "finding", text)
         if self._log is None:
             yield from self.live.marks
@@ -182,13 +183,12 @@ class TimeLine(Concern):
         return self._watched[1].broken
 
     def _required(self, logged: LoggedLevel) -> tuple[Property, ...]:
-        """Return the requirements over time of a level; none where it ran other tables than those that are here."""
+        """Return the requirements and assumptions over time of a level; none where it ran other tables than those that are here."""
         try:
             with PROVER:
-                stated = self._program(logged).properties
+                return self._program(logged).over_time
         except Refused:
             return ()
-        return tuple(one for one in stated if one.monitor is not None)
 
     def _monitored(self, logged: LoggedLevel) -> Sequence[Property]:
         return [one for one in self._required(logged) if one.monitored]

@@ -215,7 +215,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
 
 
 def _watched(asked: RunOptions, log: Path) -> bool:
-    """Say the first cycle that breaks each requirement that every run watches; return whether there is one."""
+    """Say the first cycle that breaks each requirement, or assumption, that every run watches; return whether there is one."""
     from rcsc.run.log.read import read
     from rcsc.run.log.required import BrokenRequirement, broken_in, requirements
 
@@ -224,9 +224,12 @@ def _watched(asked: RunOptions, log: Path) -> bool:
     for one in broken_in(read(log), wanted) if wanted else ():
         first.setdefault((one.level, one.name), one)
     for one in sorted(first.values(), key=lambda one: one.tick):
-        message = f"level `{one.level}`, cycle {one.tick}: requirement `{one.name}` is broken: {one.shown}"
+        what = "requirement" if not one.assumed else "by what comes from outside, assumption"
+        message = f"level `{one.level}`, cycle {one.tick}: {what} `{one.name}` is broken: {one.shown}"
         say_error(Code.PROPERTY_BROKEN, message)
         attach("note", f"it says: {one.text}")
+        if one.assumed:
+            attach("note", "what is proved trusting it says nothing of this cycle, nor of any later one")
         attach("help", f'rcsc replay {shlex.quote(str(log))} --find "not {one.level}.{one.name}"')
     return bool(first)
 

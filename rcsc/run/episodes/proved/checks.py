@@ -35,6 +35,8 @@ def check_of(claim: Claim, reader: Reader, level: ProvedLevel) -> Check:
     Raises:
         CannotWatch: Nothing here can.
     """
+    if claim.kind == "KEPT":
+        raise CannotWatch("it is about what could come, too")
     maker = _MAKERS.get(claim.kind)
     if maker is None:
         raise CannotWatch("it is about no cycle that runs")

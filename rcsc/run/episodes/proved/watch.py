@@ -17,7 +17,8 @@ from dataclasses import dataclass, field
 
 from rcsc.lang.interpret import UNDEFINED, Fault, admit, holds
 from rcsc.lang.interpret import cycle as one_cycle
-from rcsc.lang.model import Value
+from rcsc.lang.model import Property, Value
+from rcsc.lang.over_time import Watch
 from rcsc.lang.restart import ECHO, ECHOED, NUMBER, NUMBERS, STATUS
 from rcsc.run.episodes.cycle import Broken, Cycle
 from rcsc.run.episodes.proved.checks import CannotWatch, Check, check_of, contract
@@ -203,7 +204,10 @@ def _clamped(_: Trusted, reader: Reader, __: Stand) -> Check:
 
 
 def _declared(trusted: Trusted, reader: Reader, _: Stand) -> Check:
-    """A fact that a table declares: as the first table of the cycle saw it, where that can be computed."""
+    """A fact that a table declares: as the first table of the cycle saw it, where that can be computed; or one over time."""
+    for stated in reader.program.environment:
+        if stated.name == trusted.name:
+            return _over_time(stated, reader)
     condition = next(fact.condition for fact in reader.program.assumptions if fact.name == trusted.name)
     tables = {str(table.name) for table in reader.program.tables if trusted.name in table.assumptions}
 
@@ -215,6 +219,19 @@ def _declared(trusted: Trusted, reader: Reader, _: Stand) -> Check:
             if holds(condition, seen):
                 return ""
         return f"`{trusted.name}` does not hold"
+
+    return check
+
+
+def _over_time(stated: Property, reader: Reader) -> Check:
+    """What is assumed over time of what comes from outside: each cycle is one of the run, a refused one, too."""
+    watch = Watch(stated)
+
+    def check(now: Now) -> str:
+        if now.begins:
+            watch.begin()
+        kept = watch.keeps(reader.snapshot(now.before), reader.snapshot(now.values))
+        return "" if kept else f"`{stated.name}` does not hold"
 
     return check
 

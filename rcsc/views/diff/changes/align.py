@@ -153,6 +153,7 @@ class _Rewriter:
             assumptions=self.any(program.assumptions),
             invariants=self.any(program.invariants),
             properties=self.any(program.properties),
+            environment=self.any(program.environment),
             tables=self.any(program.tables),
             levels=self.any(program.levels),
         )

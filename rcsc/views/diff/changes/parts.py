@@ -314,8 +314,8 @@ def conditions(versions: Versions) -> Iterator[ComparedPart]:
 
 
 def _properties(versions: Versions) -> Iterator[ComparedPart]:
-    """Yield each property, with its text where it is new, gone or changed."""
-    old, new = ({p.name: p for p in version.properties} for version in (versions.before, versions.after))
+    """Yield each property, requirement and assumption over time, with its text where it is new, gone or changed."""
+    old, new = ({p.name: p for p in version.stated} for version in (versions.before, versions.after))
     for name in dict.fromkeys((*old, *new)):
         if name not in new or name not in old:
             only = old[name] if name in old else new[name]
@@ -331,10 +331,12 @@ def _properties(versions: Versions) -> Iterator[ComparedPart]:
 
 
 def _over_time(old: Property, new: Property) -> ComparedPart:
-    """Compare two requirements over time by what their monitors do."""
+    """Compare two requirements or assumptions over time by what their monitors do."""
     apart = []
     if (old.condition, old.monitor) != (new.condition, new.monitor):
         apart.append(f"{_words(old)} -> {_words(new)}")
+    if old.word != new.word:
+        apart.append(f"{old.word}, now {new.word}")
     if old.monitored is not new.monitored:
         apart.append("monitored, now not" if old.monitored else "now monitored")
     return ComparedPart(new.word, new.name, tuple(apart), basis=Basis.DIGEST)
