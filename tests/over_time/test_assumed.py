@@ -101,7 +101,7 @@ level l {{ period 10 [ms] table t }}
         (": when asks, within 3 cycles, once speed > 0", "RCS324", "`once speed > 0` is about no input: nothing from outside can keep it"),
         ("monitored : always asks", "RCS324", "an assumption over time is trusted: nothing shows that it is `monitored`"),
         ("proved : always asks", "RCS324", "an assumption over time is trusted: nothing shows that it is `proved`"),
-        (": when asks, eventually rolls", "RCS323", "no cycle is too late for `eventually`: what it asks for may always still come"),
+        (": when asks, eventually rolls", "RCS324", "an assumption needs a bound: what `eventually` asks for may always still come"),
         (": whenever was speed = 0, at once rolls", "RCS315", "`was` goes back one cycle, not two"),
     ],
 )  # fmt: skip

@@ -198,19 +198,20 @@ class _Waiting:
         """The numbers of orders, and their echoes, which go on."""
         return frozenset(leaf for below in self.ts.links.below for leaf in (below.number, below.echo))
 
-    def comes_round(self, cycles: Sequence[Cycle]) -> Node:
-        """Return the condition that the cycles are a lasso on which it waits."""
+    def goes(self, cycle: Cycle) -> Node:
+        """Return the condition that it waits in a cycle, in which nothing is refused."""
+        waits = (values.negation(each.holds) for each in obligations(self.ts, cycle))
+        return values.all_of((cycle.contract, cycle.goes_on, values.negation(cycle.refused), *waits))
+
+    def same(self, cycles: Sequence[Cycle]) -> Node:
+        """Return the condition that all is as before after the cycles, and that each subordinate got an order, or has answered."""
         first, last = cycles[0], cycles[-1]
-        goes = (
-            values.all_of((cycle.contract, cycle.goes_on, values.negation(cycle.refused))) for cycle in cycles
-        )
-        waits = (values.negation(each.holds) for cycle in cycles for each in obligations(self.ts, cycle))
         same = (
             values.equal(first.before[leaf], last.after[leaf])
             for leaf in self.leaves
             if leaf not in self.numbers
         )
-        return values.all_of((*goes, *waits, *same, *_due(self.ts, cycles)))
+        return values.all_of((*same, *_due(self.ts, cycles)))
 
     def is_lasso(self, lasso: Sequence[CycleRun]) -> bool:
         """Return whether cycles that were run are a lasso on which it waits: on values, which is quick where it is long."""
@@ -257,10 +258,13 @@ def waiting_lasso(
 
 
 def _simplest(waits: _Waiting, search: TraceSearch) -> Lasso | NotReproducedError | None:
-    run = Unrolled(waits.ts, search)
+    run, goes = Unrolled(waits.ts, search), list[Node]()
     for _ in range(search.most):
-        run.further()
-        every = (waits.comes_round(run.cycles[start:]) for start in range(1, len(run.cycles)))
+        goes.append(waits.goes(run.further()))
+        on, every = values.TRUE, list[Node]()
+        for first in range(len(goes) - 1, 0, -1):
+            on = values.both(goes[first], on)
+            every.append(values.both(on, waits.same(run.cycles[first:])))
         if run.reaches(wrong := values.any_of(every)):
             start, given = run.inputs(wrong)
             return _ran_round(waits, start, given, search, guessed=run.guessed)
