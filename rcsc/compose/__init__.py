@@ -2,20 +2,17 @@
 
 What is proved of each level, alone in its environment (`proof.level`):
 
-- every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
-  not reached if it is declared unreachable; no state is written directly while another is pending. Of several tables
-  in a cycle each owes this at its place, on what those before it left;
+- every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; no DEFAULT declared unreachable
+  is reached; no state is written directly while another is pending. Of several tables in a cycle each owes this where it stands;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
 - no new command is passed over by a line that does not look for one; a PAUSE is passed on in the cycle that takes it;
 - its program's invariants, its properties over a cycle and the one before (`properties`), its requirements over time;
-- its guarantees for neighbours: its report echoes the number and the command of the order that it took in that
-  very cycle (so no order is lost, and none is echoed that was not run); its orders change only together with their
-  numbers, and numbers come one after the other;
+- its guarantees for neighbours: its report echoes number and command of the order that it took in that very cycle (so no order is lost,
+  and none is echoed that was not run); its orders change only together with their numbers, and numbers come one after the other;
 - of a level by hand, that *done* and *failed* stay (others state it as properties): no proof of a neighbour takes it for granted.
 
-Context: lines that are never reached, what a line does when it matches again (`proof.context`), states that nothing leaves (`proof.stuck`).
-Termination: every command is answered if subordinates answer theirs (`proof.termination`, `proof.ranking`). What requirements ask for
-eventually comes (`proof.eventually`).
+Context: lines that are never reached or match again (`proof.context`), states that nothing leaves (`proof.stuck`). Termination: commands
+are answered if subordinates answer theirs (`proof.termination`, `proof.ranking`); what has to come eventually comes (`proof.eventually`).
 
 What a level assumes of its environment is the contract (`transition`):
 
@@ -55,9 +52,8 @@ Further assumptions:
 - *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is shown in turn
   of every subordinate that is a level. No level's inputs are refused for ever; after the last refusal all is as if there had been none,
   from a state within the invariant. If it is printed, the values in an input stay the same meanwhile, too.
-- That something comes *eventually* assumes of refusals and answers the same, and nothing else: no input comes by itself, and a restart
-  ends what is waited for. It is shown as a bound on the cycles in a row in which its monitor waits (`proof.eventually`); a cycle that is
-  refused is not counted, and leaves the count as it is.
+- *Eventually* assumes the same of refusals and answers, and nothing else: no input comes by itself, and a restart ends what is waited
+  for. It is shown as a bound on the cycles in a row in which its monitor waits, those not counted that are refused (`proof.eventually`).
 - *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means, which are only listed.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses

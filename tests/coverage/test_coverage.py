@@ -12,12 +12,14 @@ from rcsc.compose.contract.claims import ACCEPTED, Verdict
 from rcsc.compose.contract.environment import Given
 from rcsc.compose.contract.obligations import obligations
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.coverage.again import shown_again
 from rcsc.compose.coverage.cores import Core, core, each_needed
 from rcsc.compose.coverage.covered import Coverage, covered, stated
 from rcsc.compose.coverage.offers import notices
 from rcsc.compose.coverage.parts import How, Use, switched, uses_of
 from rcsc.compose.coverage.questions import Questions
 from rcsc.compose.coverage.slips import Fate, environments, judged, slips_of
+from rcsc.compose.invariant.search import FoundInvariant
 from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import read_systems, transition_systems
 from rcsc.front.commands import run
@@ -356,6 +358,17 @@ level solo { period 10 [ms] table t }
         if not one.slip.whole_line and one.slip.uses[0].line == "wrap"
     }
     assert fates == {"n": Fate.NOTICED, "laps": Fate.SURVIVES}
+
+
+def test_what_a_search_says_counts_only_if_it_is_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    ts = alone(ROBOT.replace("implies now = bad", "implies now = still"))
+    proof = prove_level(ts, LITTLE)
+    asked = [("property", "", "third_fails")]
+    assert [owed.name for owed in proof.open] == ["third_fails"]
+    assert not shown_again(ts, proof, range(len(proof.clauses)), asked)
+    assert shown_again(ts, proof, range(len(proof.clauses)), [("property", "", "slow")])
+    monkeypatch.setattr("rcsc.compose.coverage.again.search", lambda *_: FoundInvariant())
+    assert not shown_again(ts, proof, (), asked)
 
 
 def test_an_invariant_is_no_requirement_and_notices_nevertheless() -> None:

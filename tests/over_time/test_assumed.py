@@ -247,12 +247,14 @@ def unused(*_: object) -> values.Node:
     return values.TRUE
 
 
-def a_cycle_late(program: Program, before: Leaves, after: Leaves, refusals: Refusals) -> Leaves:
+def a_cycle_late(
+    program: Program, before: Leaves, after: Leaves, refusals: Refusals, idle: values.Node
+) -> Leaves:
     """Judge assumptions on the inputs of the cycle before."""
     inputs = {str(v.name) for v in program.variables if v.kind.value == "input"}
     late = {**after, **{name: before[name] for name in inputs}}
-    ghosts = watched.ghosts_after(program, before, after, refusals)
-    return ghosts | watched.ghosts_after(replace(program, properties=()), before, late, refusals)
+    ghosts = watched.ghosts_after(program, before, after, refusals, idle)
+    return ghosts | watched.ghosts_after(replace(program, properties=()), before, late, refusals, idle)
 
 
 def noticed(engine: Callable[[TransitionSystem, Truth], None]) -> bool:

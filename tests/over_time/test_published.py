@@ -14,7 +14,7 @@ import pytest
 from rcsc.lang.model import Property
 from rcsc.lang.over_time import Watch
 from rcsc.lang.over_time.past import FALSE
-from tests.over_time.formulas import parsed
+from tests.over_time.formulas.finite import parsed
 from tests.over_time.test_templates import rows
 from tests.support.programs.stages import program_of
 

@@ -11,8 +11,8 @@ from rcsc.lang.interpret import holds
 from rcsc.lang.model import Bool, Expr, Monitor, Read, VariableName
 from rcsc.lang.over_time import Past, Requirement, Scope, Timing, Trigger, begun, monitored, stepped
 from rcsc.lang.over_time.past import FALSE
-from tests.over_time import endless
-from tests.over_time.formulas import parsed
+from tests.over_time.formulas import endless
+from tests.over_time.formulas.finite import parsed
 
 DATA = Path(__file__).parents[1] / "data"
 SCOPES = {

@@ -1048,9 +1048,9 @@ class Code(StrEnum):
     NOT_OF_OUTSIDE = """RCS324: an assumption over time that is not about what comes from outside
 
     `rcsc prove` trusts an assumption over time, and so it may only restrict what no level writes: inputs from outside. What it reads of the
-    level's own variables is what the cycle before left. So its response is about an input, it comes too late in some cycle, and it
-    is `assumed`, or `assumed monitored`, which runs watch, too. It is of the whole level, and no table names it under `assuming`. Orders, reports, answers of the database and
-    what other levels write follow the protocol or are proved of who writes them: it reads none of them.
+    level's own variables is what the cycle before left. So its response is about an input, it comes too late in some cycle, and it is
+    `assumed`, or `assumed monitored`, which runs watch, too. It is of the whole level, and no table names it under `assuming`. Orders,
+    reports, answers of the database and what other levels write follow the protocol or are proved of their writers: it reads none of these.
 
         input rolls : bool
         output speed : int 0 .. 100

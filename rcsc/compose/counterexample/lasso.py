@@ -260,6 +260,8 @@ def waiting_lasso(
 def _simplest(waits: _Waiting, search: TraceSearch) -> Lasso | NotReproducedError | None:
     run, goes = Unrolled(waits.ts, search), list[Node]()
     for _ in range(search.most):
+        if run.effort > MOST_EFFORT:
+            raise GaveUpError
         goes.append(waits.goes(run.further()))
         on, every = values.TRUE, list[Node]()
         for first in range(len(goes) - 1, 0, -1):

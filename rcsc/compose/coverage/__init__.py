@@ -18,6 +18,6 @@ Cost: a question for each clause that is needed, one or two for each member of a
 an invariant for few slips. Some tens of seconds for a level of a hundred lines. Asked for, never by default.
 
 Modules, in the order the data flows: `parts` (uses, and programs with switches), `questions` (what follows while they are off), `tried`
-(runs while they are off), `cores`, `slips`, `offers` (properties that would notice), `covered` (all of one level), `kept` (what an
-earlier run found).
+(runs while they are off), `again` (an invariant of a changed level), `cores`, `slips`, `offers` (properties that would notice), `covered`
+(all of one level), `kept` (what an earlier run found).
 """

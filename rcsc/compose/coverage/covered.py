@@ -17,7 +17,7 @@ from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.coverage.cores import Core, core
-from rcsc.compose.coverage.offers import offer
+from rcsc.compose.coverage.offers import offer, sayable
 from rcsc.compose.coverage.parts import How, Use, uses_of
 from rcsc.compose.coverage.questions import Questions
 from rcsc.compose.coverage.slips import Environment, Fate, Judged, environments, judged
@@ -111,7 +111,9 @@ def covered(ts: TransitionSystem, proof: LevelProof, loaded: Loaded | None = Non
 
 def _offers(places: Sequence[Environment], slips: Sequence[Judged], loaded: Loaded) -> Iterator[Offered]:
     """Yield a property for some of the slips that survive: assignments of procedures first, whole lines last."""
-    surviving = [at for at, one in enumerate(slips) if one.fate is Fate.SURVIVES]
+    surviving = [
+        at for at, one in enumerate(slips) if one.fate is Fate.SURVIVES and sayable(places[0], one.slip)
+    ]
     surviving.sort(key=lambda at: (slips[at].slip.whole_line, not slips[at].slip.uses[0].part.procedure))
     for at in surviving[:MOST_OFFERS]:
         found = offer(places, slips[at].slip, loaded)

@@ -15,6 +15,7 @@ from dataclasses import replace
 from rcsc.code.testing.inputs.condition_text import words
 from rcsc.compose.contract.claims import ACCEPTED
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.coverage.again import shown_again
 from rcsc.compose.coverage.parts import How, Use, of_program, switched
 from rcsc.compose.coverage.questions import with_program
 from rcsc.compose.coverage.slips import Environment, Slip
@@ -54,12 +55,17 @@ def offer(places: Sequence[Environment], slip: Slip, loaded: Loaded) -> str | No
     """Return a property that is proved of the level and that the slip breaks; None where no form gives one."""
     place = places[0]
     for use in slip.uses[:MOST_LINES]:
-        for name, condition, response in _forms(place.ts, use):
+        for name, condition, response in forms(place.ts, use):
             text = f"property {name} : {condition} implies {response}"
             stated = resolved(text, loaded, name)
             if stated is not None and notices(places, slip, stated):
                 return text
     return None
+
+
+def sayable(place: Environment, slip: Slip) -> bool:
+    """Return whether some form fits."""
+    return any(True for use in slip.uses[:MOST_LINES] for _ in forms(place.ts, use))
 
 
 def resolved(text: str, loaded: Loaded, name: str) -> Property | None:
@@ -83,6 +89,10 @@ def notices(places: Sequence[Environment], slip: Slip, stated: Property) -> bool
     if not tried(slipped, [key]).broken:
         return False
     ts = with_program(place.ts, alone, place.ts)
+    if shown_again(ts, place.proof, range(len(place.proof.clauses)), [key]):
+        return True
+    if not slip.uses[0].part.procedure or slip.whole_line:
+        return False  # exact engines may take long: for assignments of procedures alone
     proof = prove_again(ts, place.proof, Effort(walks=4, looks=False))
     return any(owed.key == key and verdict in ACCEPTED for owed, verdict in proof.verdicts)
 
@@ -90,7 +100,7 @@ def notices(places: Sequence[Environment], slip: Slip, stated: Property) -> bool
 # --- forms -----------------------------------------------------------------------------------
 
 
-def _forms(ts: TransitionSystem, use: Use) -> Iterator[tuple[str, str, str]]:
+def forms(ts: TransitionSystem, use: Use) -> Iterator[tuple[str, str, str]]:
     """Yield name, condition and response of what a property may say of an assignment."""
     made = switched(ts.program, ts.level, How.LEFT_OUT)
     around = _Around(ts, use)

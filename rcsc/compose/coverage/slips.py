@@ -9,19 +9,17 @@ cycle as it is *changes nothing*: no requirement can notice it. Whether commands
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 from rcsc.compose.contract.claims import ACCEPTED, Key
-from rcsc.compose.contract.obligations import obligations
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.coverage.again import shown_again
 from rcsc.compose.coverage.parts import How, Part, Use, of_program
-from rcsc.compose.coverage.questions import LIMITS, Member, Questions, with_program
+from rcsc.compose.coverage.questions import Member, Questions, with_program
 from rcsc.compose.coverage.tried import short_runs, tried
-from rcsc.compose.invariant.search import Effort, FoundInvariant, begin, search
 from rcsc.compose.proof.level import LevelProof
 from rcsc.proof.solvers import smt
-from rcsc.proof.solvers.sat import GaveUpError
 
 SHORT, LONGER = 4, 6
 """Cycles of the runs that are looked for, at first and of what is then left."""
@@ -29,8 +27,6 @@ TOGETHER = 200_000_000
 """Steps of Z3 for all slips of a level together, some minutes; later ones are open."""
 MOST_SEARCHED = 4
 """Slips for which an invariant is searched: each may take as long as the proof of the level."""
-FEW_WALKS, STEPS = 4, 200_000_000
-"""The walks before such a search, and the steps of Z3 within it."""
 
 
 class Fate(StrEnum):
@@ -175,13 +171,21 @@ class _Judge:
 
     def _at_last(self, slip: Slip) -> Judged:
         """Look at all runs, where that is possible; search another invariant, as long as there are not too many to search."""
-        runs = [tried(slipped(one.place, slip), one.place.keys) for one in self.every]
+        runs = [tried(slipped(one.place, slip), one.place.keys, cycles=0) for one in self.every]
         if by := tuple(sorted({key for run in runs for key in run.broken})):
             return Judged(slip, Fate.NOTICED, by)
         if self.searched >= MOST_SEARCHED:
             return Judged(slip, Fate.OPEN)
         self.searched += 1
-        shown = all(_searched(one, slip) for one in self.every)
+        shown = all(
+            shown_again(
+                slipped(one.place, slip),
+                one.place.proof,
+                one.asked.kept(one.on(slip), one.asked.clauses) or (),
+                one.place.keys,
+            )
+            for one in self.every
+        )
         return Judged(slip, self._survives(slip) if shown else Fate.OPEN)
 
 
@@ -196,26 +200,3 @@ def slipped(place: Environment, slip: Slip) -> TransitionSystem:
     """Return the level with the slip."""
     program = of_program(place.ts.program, place.ts.level, How.LEFT_OUT, slip.uses)
     return with_program(place.ts, program, place.ts)
-
-
-def _searched(one: _Asked, slip: Slip) -> bool:
-    """Search the invariant of a level with a slip, from what is left of the one it has; return whether Z3 confirms that it shows all."""
-    ts, proof = slipped(one.place, slip), one.place.proof
-    cycle, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
-    wanted = obligations(ts, cycle)
-    left = one.asked.kept(one.on(slip), one.asked.clauses) or ()
-    clauses = [proof.clauses[at] for at in left]
-    effort = Effort(walks=FEW_WALKS, limits=LIMITS)
-    owed = frozenset(at for at, each in enumerate(wanted) if each.key in one.place.keys)
-    begun = replace(begin(ts, wanted, effort), open=owed)
-    named = FoundInvariant(proof.predicates, tuple(clauses)).named
-    try:
-        with smt.together(STEPS):
-            found = search(ts, firsts, cycle, wanted, effort, named, begun)
-    except GaveUpError:
-        return False
-    if found.open:
-        return False
-    again = Questions(ts, replace(proof, predicates=found.predicates, clauses=found.clauses), How.LEFT_OUT)
-    kept = again.kept(again.members, again.clauses)
-    return kept is not None and again.follow(one.place.keys, again.members, kept)

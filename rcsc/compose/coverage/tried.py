@@ -40,12 +40,12 @@ class Tried:
     complete: bool
 
 
-def tried(ts: TransitionSystem, wanted: Collection[Key]) -> Tried:
-    """Look at all runs where the states of a level can be listed; else at short ones."""
+def tried(ts: TransitionSystem, wanted: Collection[Key], cycles: int = CYCLES) -> Tried:
+    """Look at all runs where the states of a level can be listed; else at those of at most so many cycles."""
     owed = [one for one in obligations(ts, ts.cycle(ts.havoc())) if one.key in wanted]
     firsts = tuple(ts.firsts().values())
     every = every_run(ts, firsts, owed)
-    runs = further_runs(ts, firsts, owed, CYCLES) if every is None else every.runs
+    runs = every.runs if every is not None else further_runs(ts, firsts, owed, cycles) if cycles else {}
     found = frozenset(one.key for one in owed if one.key in runs and _breaks(ts, one, runs[one.key]))
     listed = every is not None and every.states is not None
     return Tried(found, complete=listed and found == runs.keys())
