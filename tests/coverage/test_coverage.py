@@ -477,3 +477,33 @@ def test_of_a_level_without_requirements_one_line_is_told(
     assert run(["prove", str(solo_system(tmp_path, text)), "--coverage"]) == 0
     told = capsys.readouterr().out.partition("coverage of level solo")[2]
     assert told.splitlines() == ["  no property and no requirement is stated of it: none speaks of any line"]
+
+
+COMES = """\
+input asks : bool
+input tick : bool
+output done : bool
+state left : int 0 .. 3
+assume alive assumed : never (not tick) for 30 [ms]
+requirement comes : when asks, eventually done
+module count reads tick, left, asks writes left, done {
+  if left > 0 { if tick { left := left - 1 } } else if asks { left := 3 }
+  done := left = 0
+}
+table t {
+  | line | asks ||
+  |------|------||
+  | any  |      ||
+}
+level l { period 10 [ms] preprocess count table t }
+"""
+
+
+def test_what_has_to_come_eventually_needs_what_its_bound_needs() -> None:
+    """Not nothing, as of a condition that no cycle breaks; and a slip that lets it wait for ever is noticed."""
+    ts = alone(COMES)
+    found = covered(ts, prove_level(ts, LITTLE))
+    [one] = found.cores
+    assert {use.part.leaves for use in one.uses} == {("left",), ("done",)}
+    fates = {one.slip.uses[0].part.span.start: one.fate for one in found.slips}
+    assert sorted(fates.values()) == [Fate.NOTICED, Fate.NOTICED, Fate.SURVIVES]

@@ -9,7 +9,7 @@ only if for each member there is such a run, with just the other members on. Mor
 other members go.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from rcsc.compose.contract.claims import ACCEPTED, Key
@@ -57,6 +57,14 @@ def core(asked: Questions, key: Key) -> Core | None:
     every = [one for one in asked.members if one in members]
     uses = tuple(one for one in every if isinstance(one, Use))
     return Core(key, uses, tuple(one for one in every if isinstance(one, str)), minimal)
+
+
+def joined(found: Core, lasts: Sequence[Core]) -> Core:
+    """Return the core of what has to come within a bound with what keeps the level going, where something is assumed over time."""
+    uses = {use: None for one in (found, *lasts) for use in one.uses}
+    names = {name: None for one in (found, *lasts) for name in one.assumptions}
+    same = len(uses) == len(found.uses) and len(names) == len(found.assumptions)
+    return Core(found.key, tuple(uses), tuple(names), found.minimal and same)
 
 
 def _fewer(asked: Questions, key: Key, found: Needed) -> Needed:

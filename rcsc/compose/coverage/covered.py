@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.coverage.cores import Core, core
+from rcsc.compose.coverage.cores import Core, core, joined
 from rcsc.compose.coverage.offers import offer, sayable
 from rcsc.compose.coverage.parts import How, Use, uses_of
 from rcsc.compose.coverage.questions import Questions
@@ -84,15 +84,18 @@ def covered(ts: TransitionSystem, proof: LevelProof, loaded: Loaded | None = Non
     unproved = tuple(key for key in wanted if key not in proved)
     places = environments(ts, proof)
     cores, again, names = list[Core](), list[Key](), dict[str, None]()
+    lasts = list[Core]()
     for place in places:
         asked = Questions(place.ts, place.proof, How.FREE)
+        if not place.ts.only:
+            lasts += [found for key in place.keys if key[0] is Sort.KEPT and (found := core(asked, key))]
         names |= {one: None for one in asked.members if isinstance(one, str)}
         for key in (key for key in wanted if key in place.keys):
             found = core(asked, key)
             if found is None:
                 again.append(key)
             else:
-                cores.append(found)
+                cores.append(joined(found, lasts) if place.ts.only else found)
     needed = {use for one in cores for use in one.uses}
     trusted = {name for one in cores for name in one.assumptions}
     slips = tuple(judged(places)) if places else ()
@@ -105,7 +108,7 @@ def covered(ts: TransitionSystem, proof: LevelProof, loaded: Loaded | None = Non
         tuple(use for use in uses_of(ts.program, ts.level) if use not in needed),
         tuple(name for name in names if name not in trusted),
         slips,
-        () if loaded is None else tuple(_offers(places, slips, loaded)),
+        () if loaded is None else tuple(_offers([one for one in places if not one.ts.only], slips, loaded)),
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.compose.contract.claims import Key
-from rcsc.compose.contract.obligations import obligations
+from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.coverage.parts import How, Switched, Use, switched
 from rcsc.compose.invariant.cubes import held
@@ -117,6 +117,11 @@ class Questions:
         self.members = tuple(self._frames[0].on)
 
     @property
+    def _kept(self) -> list[Key]:
+        """What every claim rests on: that what is assumed over time can always be kept; else no cycle follows, and nothing is broken."""
+        return [owed.key for owed, _ in self.proof.verdicts if owed.sort is Sort.KEPT]
+
+    @property
     def clauses(self) -> range:
         """All clauses of the invariant."""
         return range(len(self.proof.clauses))
@@ -155,7 +160,7 @@ class Questions:
 
     def needed(self, key: Key, on: Collection[Member], clauses: Iterable[int]) -> Needed | None:
         """Return what shows an obligation with these members on, from clauses that are an invariant then; None where nothing does."""
-        every, waiting = list(clauses), list[Goal]([key])
+        every, waiting = list(clauses), list[Goal]([key, *self._kept])
         found, members = set[int](), set[Member]()
         while waiting:
             core = self._core(waiting.pop(), on, every, found)
@@ -210,7 +215,7 @@ class Questions:
     def follow(self, keys: Collection[Key], on: Collection[Member], clauses: Sequence[int]) -> bool:
         """Return whether obligations are shown by these clauses, which are an invariant while just these members are on."""
         return all(
-            self._refutes(frame, on, clauses, smt.any_of([frame.bad[key] for key in keys]))
+            self._refutes(frame, on, clauses, smt.any_of([frame.bad[key] for key in (*keys, *self._kept)]))
             for frame in self._frames
         )
 

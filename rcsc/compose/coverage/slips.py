@@ -8,17 +8,19 @@ Left out is one assignment of a procedure in all of its uses, one cell of a line
 cycle as it is *changes nothing*: no requirement can notice it. Whether commands end is not asked again.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 from rcsc.compose.contract.claims import ACCEPTED, Key
+from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.coverage.again import shown_again
 from rcsc.compose.coverage.parts import How, Part, Use, of_program
 from rcsc.compose.coverage.questions import Member, Questions, with_program
 from rcsc.compose.coverage.tried import short_runs, tried
-from rcsc.compose.proof.level import LevelProof
+from rcsc.compose.proof.eventually import bounded_by, waiting
+from rcsc.compose.proof.level import Bound, LevelProof
 from rcsc.proof.solvers import smt
 
 SHORT, LONGER = 4, 6
@@ -76,17 +78,34 @@ class Environment:
 
 
 def environments(ts: TransitionSystem, proof: LevelProof) -> tuple[Environment, ...]:
-    """Return the environments in which claims about a level are proved: with refused inputs, where that suffices."""
-    if not proof.parts:
-        every = tuple(owed.key for owed, verdict in proof.verdicts if verdict in ACCEPTED)
-        return (Environment(ts.refusing(), proof, every),) if every else ()
-    refusing, admitting = proof.parts
-    first = tuple(owed.key for owed, verdict in refusing.verdicts if verdict in ACCEPTED)
-    rest = tuple(
-        owed.key for owed, verdict in admitting.verdicts if verdict in ACCEPTED and owed.key not in first
-    )
+    """Return the environments in which claims about a level are proved: with refused inputs, where that suffices.
+
+    What has to come eventually is proved of the level within its bound, which owes nothing else: such come last.
+    """
+    bounds = tuple(_within(ts, bound) for bound in proof.bounds)
+    apart = {waiting_key(bound.name) for bound in proof.bounds}
+    refusing, admitting = proof.parts or (proof, proof)
+    first = _proved(refusing, apart)
+    rest = _proved(admitting, {*first, *apart})
     both = (Environment(ts.refusing(), refusing, first), Environment(ts, admitting, rest))
-    return tuple(one for one in both if one.keys)
+    return tuple(one for one in (*both, *bounds) if one.keys)
+
+
+def _proved(proof: LevelProof, apart: Collection[Key]) -> tuple[Key, ...]:
+    return tuple(
+        owed.key for owed, verdict in proof.verdicts if verdict in ACCEPTED and owed.key not in apart
+    )
+
+
+def _within(ts: TransitionSystem, bound: Bound) -> Environment:
+    """Return the level that owes only what comes within a bound."""
+    place = bounded_by(ts if bound.admitting else ts.refusing(), waiting(ts)[bound.name], bound.within)
+    return Environment(place, bound.proof, (waiting_key(bound.name),))
+
+
+def waiting_key(name: str) -> Key:
+    """Return the key of a requirement over time."""
+    return Sort.REQUIREMENT, "", name
 
 
 def slips_of(uses: Sequence[Use]) -> Iterator[Slip]:
