@@ -54,6 +54,7 @@ LEFT_OUT: Mapping[str, str] = {
     Sort.SAME_ORDER: "a level's contract, not its claim: compared as the contract of what it takes",
     Sort.OF_ITS_ORDER: "a level's contract, not its claim: compared as the contract of what it takes",
     Sort.REQUIREMENT: "held against every run of small levels in `over_time`",
+    Sort.KEPT: "what is assumed over time: held against every run of small levels in `over_time`",
     Sort.PROTOCOL: "names all sorts of the protocol at once where they cannot be stated",
 }
 """Sorts that are no claims of their own, with the reason."""
