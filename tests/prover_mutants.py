@@ -48,6 +48,7 @@ MODULES = tuple(
     f"rcsc/{room}{name}.py"
     for room, names in {
         "lang/": "interpret interval_sets operator_table",
+        "lang/over_time/": "past monitor run",
         "proof/certify/": "__init__ known owed execution settle table values",
         "proof/table/regions/": "atoms ends holes linear partition points region splitting",
         "proof/table/": "boxes confirm program relational decide",
@@ -56,7 +57,8 @@ MODULES = tuple(
         "proof/symbolic/": "encode evaluation execution trial values keyed measured",
         "proof/solvers/": "search smt",
         "compose/proof/": "assume_guarantee context termination level ranking system",
-        "compose/contract/": "claims environment obligations properties transition",
+        "compose/contract/": "claims environment obligations properties transition watched",
+        "compose/exact/": "circuit",
         "compose/invariant/": "confirm",
     }.items()
     for name in names.split()
@@ -71,6 +73,8 @@ TESTS = tuple(
     compose/test_compose diff/test_diff
     stages/test_cycle stages/test_proof together/test_precedence together/test_same table/test_word_bits lang/test_looking_back
     compose/test_facts compose/test_protocol whole_systems/test_whole_systems
+    over_time/test_templates over_time/test_past over_time/test_requirements over_time/test_assumed over_time/test_eventually
+    over_time/test_published exact/test_exact exact/test_eventual
     """.split()
 )
 Key = TypeVar("Key")

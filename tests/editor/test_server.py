@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from rcsc.desk.editor.values import State
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.proof.solvers.options import Options
-from tests.editor.client import PUSHED, WHOLE, Client, RefusedError, applied
+from tests.editor.client import PATIENCE_S, PUSHED, WHOLE, Client, RefusedError, applied
 
 REPO = Path(__file__).parents[2]
 GRIP = "examples/grip.rcs"
@@ -147,6 +148,10 @@ def test_hover_says_type_unit_range_writer_and_proof(client: Client) -> None:
         value: str = answer["contents"]["value"]
         return value
 
+    end_s = time.monotonic() + PATIENCE_S
+    while "being proved" in hovered("grip", "table"):  # on a busy machine the first look ends before
+        assert time.monotonic() < end_s
+        time.sleep(0.05)
     width = hovered("width_mm", "table")
     assert "input width_mm : int 0 .. 110 [mm] clamp" in width
     assert "from 0 to 110 mm" in width
