@@ -74,7 +74,7 @@ TESTS = tuple(
     stages/test_cycle stages/test_proof together/test_precedence together/test_same table/test_word_bits lang/test_looking_back
     compose/test_facts compose/test_protocol whole_systems/test_whole_systems
     over_time/test_templates over_time/test_past over_time/test_requirements over_time/test_assumed over_time/test_eventually
-    over_time/test_published exact/test_exact exact/test_eventual
+    over_time/test_published exact/test_circuit exact/test_exact exact/test_eventual
     """.split()
 )
 Key = TypeVar("Key")
