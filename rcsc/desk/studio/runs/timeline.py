@@ -8,6 +8,7 @@ so that a cell is judged on the values that the table saw.
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -30,9 +31,10 @@ from rcsc.lang.interpret import (
 from rcsc.lang.leaves import conjuncts, read_by
 from rcsc.lang.model import Expr, Line, Procedure, Program, Property, Table, Test, Value, spell
 from rcsc.run.description import BadDescription, description
+from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import BadCondition, Predicate, predicate
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.required import BrokenRequirement, kept_columns
+from rcsc.run.log.required import BrokenRequirement, kept_columns, requirements
 from rcsc.run.signature import Signature, Values, number_word
 
 MOST_MARKED = 1000
@@ -179,19 +181,21 @@ class TimeLine(Concern):
             return ()
         if self._watched is None or self._watched[0] is not history:
             self._watched = history, Watched()
-        self._watched[1].look(history, self._monitored)
+        self._watched[1].look(history, partial(self._required, monitored=True))
         return self._watched[1].broken
 
-    def _required(self, logged: LoggedLevel) -> tuple[Property, ...]:
-        """Return the requirements and assumptions over time of a level; none where it ran other tables than those that are here."""
-        try:
-            with PROVER:
-                return self._program(logged).over_time
-        except Refused:
-            return ()
+    def _required(self, log: Log, *, monitored: bool = False) -> dict[str, tuple[Property, ...]]:
+        """Return what is required and assumed over time of levels, from their sources; nothing of one that ran other tables than now.
 
-    def _monitored(self, logged: LoggedLevel) -> Sequence[Property]:
-        return [one for one in self._required(logged) if one.monitored]
+        Nothing is proved or compiled for it: the run goes on meanwhile.
+        """
+        path = self.live.opening.path
+        try:
+            every = requirements(path, description(path), monitored=monitored)
+            here = {level.name for level in log.levels if self._running(level) is not None}
+        except (BadDescription, Refused):
+            return {}
+        return {name: stated for name, stated in every.items() if name in here}
 
     # --- values ---
 
@@ -243,18 +247,26 @@ class TimeLine(Concern):
         Raises:
             Refused: The levels that run here have others.
         """
+        level = self._running(logged)
+        if level is None:
+            raise Refused(Code.STUDIO, f"level `{logged.name}` ran other tables then than it runs now")
+        return self.live.session().program(level)
+
+    def _running(self, logged: LoggedLevel) -> RunningLevel | None:
+        """Return the level that runs, if it has the tables that the run had.
+
+        Raises:
+            Refused: Nothing runs.
+        """
         session = self.live.session()
         level = next((one for one in session.levels if one.name == logged.name), None)
+        if level is None:
+            return None
         if self._log is None:
-            same = level is not None and level.sign is logged.sign
-        else:
-            assert self._log.log is not None
-            same = level is not None and self._log.log.programs.get(logged.sign.program) == session.digest(
-                level
-            )
-        if not same or level is None:
-            raise Refused(Code.STUDIO, f"level `{logged.name}` ran other tables then than it runs now")
-        return session.program(level)
+            return level if level.sign is logged.sign else None
+        assert self._log.log is not None
+        same = self._log.log.programs.get(logged.sign.program) == session.digest(level)
+        return level if same else None
 
     def _on_find(self, ask: Ask) -> Json:
         """Find the next tick, or the one before, in which a condition holds; null where there is none."""
@@ -268,11 +280,7 @@ class TimeLine(Concern):
         for count, at in enumerate(ticks):
             log = history.ran_at(at)
             if id(log) not in asked:
-                columns, kept = kept_columns(log, {one.name: self._required(one) for one in log.levels})
-                try:
-                    asked[id(log)] = predicate(text, log.levels, columns), kept
-                except BadCondition as error:
-                    raise Refused(Code.STUDIO, str(error), *error.helps) from error
+                asked[id(log)] = self._predicate(text, log)
             if count % _BREATH == 0:
                 ask.progress("searching", count, len(ticks))
             held = {one.name: values for one in log.levels if (values := one.track.latest(at)) is not None}
@@ -280,6 +288,21 @@ class TimeLine(Concern):
             if holds_here({**held, **kept(at)}):
                 return {"tick": at}
         return {"tick": None}
+
+    def _predicate(self, text: str, log: Log) -> tuple[Predicate, Callable[[int], Mapping[str, Values]]]:
+        """Return what a text asks of a log, and what it needs of a tick beside the levels: requirements, for one that names them.
+
+        Raises:
+            Refused: It is no condition, or names what is not there.
+        """
+        try:
+            return predicate(text, log.levels), lambda _: {}
+        except BadCondition:
+            columns, kept = kept_columns(log, self._required(log))
+        try:
+            return predicate(text, log.levels, columns), kept
+        except BadCondition as error:
+            raise Refused(Code.STUDIO, str(error), *error.helps) from error
 
 
 def _leaf(sign: Signature, at: int) -> dict[str, Any]:

@@ -4,14 +4,13 @@ In: a history that goes on, and the requirements of its levels. Out: each cycle 
 not looked at again, unless ticks were taken back.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.desk.studio.runs.history import History
 from rcsc.lang.model import Property
-from rcsc.run.log.read import LoggedLevel
+from rcsc.run.log.read import Log
 from rcsc.run.log.required import BrokenRequirement, WatchedTrack
-from rcsc.run.signature import Signature
 
 
 @dataclass(slots=True)
@@ -24,18 +23,19 @@ class Watched:
 
     broken: list[BrokenRequirement] = field(default_factory=list)
     _era: int = -1
-    _tracks: dict[tuple[int, str], tuple[Signature, WatchedTrack]] = field(default_factory=dict)
+    _tracks: list[list[WatchedTrack]] = field(default_factory=list)
 
-    def look(self, history: History, wanted: Callable[[LoggedLevel], Sequence[Property]]) -> None:
-        """Look at the cycles that came since; `wanted` gives the requirements of a level as it ran."""
+    def look(self, history: History, wanted: Callable[[Log], Mapping[str, Sequence[Property]]]) -> None:
+        """Look at the cycles that came since; `wanted` gives the requirements of a log's levels, and is asked once."""
         if history.era != self._era:
             self._era = history.era
             self.broken.clear()
             self._tracks.clear()
         for number, log in enumerate(history.logs):
-            for level in log.levels:
-                sign, track = self._tracks.get((number, level.name), (None, None))
-                if track is None or sign is not level.sign:
-                    track = WatchedTrack.of(level.sign, wanted(level))
-                    self._tracks[number, level.name] = level.sign, track
+            if number == len(self._tracks):
+                stated = wanted(log)
+                self._tracks.append(
+                    [WatchedTrack.of(level.sign, stated.get(level.name, ())) for level in log.levels]
+                )
+            for level, track in zip(log.levels, self._tracks[number], strict=True):
                 self.broken += track.further(level)
