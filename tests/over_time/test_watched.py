@@ -96,21 +96,15 @@ def test_processes_watch_the_same(system: Path, capsys: pytest.CaptureFixture[st
     assert re.findall(r"cycle (\d+): requirement `(\w+)`", said(capsys)) == [("7", "in_time")]
 
 
+def campaign(system: Path, episodes: int) -> list[str]:
+    drawn = ["--episodes", str(episodes), "--seed", "1", "--executor", "python", "--workers", "1"]
+    return ["campaign", str(system), *drawn]
+
+
 def test_a_campaign_watches_every_requirement_and_names_the_cycle(
     system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    command = [
-        "campaign",
-        str(system),
-        "--episodes",
-        "4",
-        "--seed",
-        "1",
-        "--executor",
-        "python",
-        "--workers",
-        "1",
-    ]
+    command = campaign(system, episodes=4)
     assert rcsc([*command, "--save", str(tmp_path / "found")]) == 1
     text = said(capsys)
     assert "`l: in_time` does not hold: `when asked, within 1 cycles, given` is broken in line `wait`" in text
@@ -151,18 +145,7 @@ def test_in_a_campaign_what_a_level_does_after_the_plant_broke_an_assumption_is_
     system: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (system / "door.rcs").write_text(BRIEF, encoding="utf-8")
-    command = [
-        "campaign",
-        str(system),
-        "--episodes",
-        "4",
-        "--seed",
-        "1",
-        "--executor",
-        "python",
-        "--workers",
-        "1",
-    ]
+    command = campaign(system, episodes=4)
     assert rcsc([*command, "--save", str(tmp_path / "found")]) == 1
     text = said(capsys)
     assert (
@@ -178,18 +161,7 @@ def test_where_no_plant_is_given_an_episode_that_breaks_an_assumption_is_excused
     (system / "door.rcs").write_text(BRIEF, encoding="utf-8")
     path = system / "system.toml"
     path.write_text(path.read_text(encoding="utf-8").partition("[plant]")[0], encoding="utf-8")
-    command = [
-        "campaign",
-        str(system),
-        "--episodes",
-        "30",
-        "--seed",
-        "1",
-        "--executor",
-        "python",
-        "--workers",
-        "1",
-    ]
+    command = campaign(system, episodes=30)
     status = rcsc([*command, "--save", str(tmp_path / "found")])
     text = said(capsys)
     assert (status, "does not hold:" in text) == (0, False), text

@@ -142,10 +142,15 @@ class Obligation:
         return f"{self.sort.value}: `{self.name}`" if self.name else self.sort.value
 
 
+def of_requirement(name: str) -> ObligationKey:
+    """Return the key of the obligation that a requirement over time is kept."""
+    return Sort.REQUIREMENT, "", name
+
+
 def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
     """List all obligations of a level, those of its tables first; or the one that is asked about (`TransitionSystem.only`)."""
     if ts.only is not None:
-        return tuple(owed for owed in _stated(ts, cycle) if owed.key == (Sort.REQUIREMENT, "", ts.only))
+        return tuple(owed for owed in _stated(ts, cycle) if owed.key == of_requirement(ts.only))
     return (
         *_tables(cycle),
         *_upward(ts, cycle),

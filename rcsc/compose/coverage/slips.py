@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rcsc.compose.contract.claims import ACCEPTED, Key
-from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.coverage.again import shown_again
 from rcsc.compose.coverage.parts import How, Part, Use, of_program
 from rcsc.compose.coverage.questions import Member, Questions, with_program
 from rcsc.compose.coverage.tried import short_runs, tried
-from rcsc.compose.proof.eventually import bounded_by, waiting
-from rcsc.compose.proof.level import Bound, LevelProof
+from rcsc.compose.proof.level import LevelProof
 from rcsc.proof.solvers import smt
 
 SHORT, LONGER = 4, 6
@@ -82,8 +80,8 @@ def environments(ts: TransitionSystem, proof: LevelProof) -> tuple[Environment, 
 
     What has to come eventually is proved of the level within its bound, which owes nothing else: such come last.
     """
-    bounds = tuple(_within(ts, bound) for bound in proof.bounds)
-    apart = {waiting_key(bound.name) for bound in proof.bounds}
+    bounds = tuple(Environment(bound.level(ts), bound.proof, (bound.key,)) for bound in proof.bounds)
+    apart = {bound.key for bound in proof.bounds}
     refusing, admitting = proof.parts or (proof, proof)
     first = _proved(refusing, apart)
     rest = _proved(admitting, {*first, *apart})
@@ -95,17 +93,6 @@ def _proved(proof: LevelProof, apart: Collection[Key]) -> tuple[Key, ...]:
     return tuple(
         owed.key for owed, verdict in proof.verdicts if verdict in ACCEPTED and owed.key not in apart
     )
-
-
-def _within(ts: TransitionSystem, bound: Bound) -> Environment:
-    """Return the level that owes only what comes within a bound."""
-    place = bounded_by(ts if bound.admitting else ts.refusing(), waiting(ts)[bound.name], bound.within)
-    return Environment(place, bound.proof, (waiting_key(bound.name),))
-
-
-def waiting_key(name: str) -> Key:
-    """Return the key of a requirement over time."""
-    return Sort.REQUIREMENT, "", name
 
 
 def slips_of(uses: Sequence[Use]) -> Iterator[Slip]:

@@ -187,7 +187,7 @@ def _of_bound(ts: TransitionSystem, proof: LevelProof, bound: Bound) -> Claim:
     asked = [other for other in below if not other.answers_in_time]
     trusts = [_ANSWERS.format(other.name) for other in asked if other.outside]
     needs = ((other.name, ENDING) for other in asked if not other.outside)
-    admitting = bound.admitting or proof.needs_admission((Sort.REQUIREMENT, "", bound.name))
+    admitting = bound.admitting or proof.needs_admission(bound.key)
     return Claim(Verdict.PROVED, ((name, RUNS), *needs), (*trusts, *_goes_on(ts, admitting=admitting)))
 
 

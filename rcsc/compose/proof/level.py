@@ -13,7 +13,14 @@ from functools import partial
 from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import ACCEPTED, Key
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
-from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
+from rcsc.compose.contract.obligations import (
+    Obligation,
+    Sort,
+    Unstated,
+    obligations,
+    of_requirement,
+    unstated,
+)
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
@@ -98,8 +105,7 @@ class LevelProof:
 
     def bound(self, key: Key) -> "Bound | None":
         """Return the bound by which a requirement that may wait for ever is proved; None for any other obligation."""
-        named = (bound for bound in self.bounds if (Sort.REQUIREMENT, "", bound.name) == key)
-        return next(named, None)
+        return next((bound for bound in self.bounds if bound.key == key), None)
 
     def needs_admission(self, key: Key) -> bool:
         """Return whether an obligation is proved only if no input is refused."""
@@ -159,6 +165,16 @@ class Bound:
     proof: LevelProof
 
     @property
+    def key(self) -> Key:
+        """The key of the requirement."""
+        return of_requirement(self.name)
+
+    def level(self, ts: TransitionSystem) -> TransitionSystem:
+        """Return the level that owes the requirement within the bound, and nothing else; inputs refused where it is proved so."""
+        where = ts if self.admitting else ts.refusing()
+        return bounded_by(where, waiting(ts)[self.name], self.within)
+
+    @property
     def how(self) -> str:
         """How it was proved, in words."""
         return ", ".join((self.within.shown, *(by for _, by in self.proof.by)))
@@ -173,9 +189,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None, cache: Cache
     proof = _in_each_cycle(ts, effort, cache)
     begun = time.perf_counter()
     wanted = (
-        stated
-        for name, stated in waiting(ts).items()
-        if proof.verdict(Sort.REQUIREMENT, "", name) in ACCEPTED
+        stated for name, stated in waiting(ts).items() if proof.verdict(*of_requirement(name)) in ACCEPTED
     )
     tried = {stated.name: _bound(ts, proof, stated, effort) for stated in wanted}
     bounds = tuple(bound for bound in tried.values() if isinstance(bound, Bound))
@@ -193,7 +207,7 @@ def bounded_proof(
     """Return the proof with these bounds: requirements that may wait for ever, and have none, are not proved, or undecided."""
     names = {bound.name for bound in bounds}
     unbounded: dict[Key, Verdict] = {
-        (Sort.REQUIREMENT, "", name): Verdict.UNDECIDED if name in undecided else Verdict.NOT_PROVED
+        of_requirement(name): Verdict.UNDECIDED if name in undecided else Verdict.NOT_PROVED
         for name in waiting(ts)
         if name not in names
     }
@@ -201,7 +215,7 @@ def bounded_proof(
         (owed, unbounded.get(owed.key, verdict) if verdict in ACCEPTED else verdict)
         for owed, verdict in proof.verdicts
     )
-    how: dict[Key, str] = {(Sort.REQUIREMENT, "", bound.name): bound.how for bound in bounds}
+    how = {bound.key: bound.how for bound in bounds}
     return replace(proof, verdicts=verdicts, bounds=bounds, by=tuple({**dict(proof.by), **how}.items()))
 
 
@@ -209,7 +223,7 @@ def _bound(ts: TransitionSystem, proof: LevelProof, stated: Property, effort: Ef
     """Prove a bound for a requirement: with refusals, if it is proved with these in each cycle; else without. Return why there is none."""
     wanted, refusing, why = list(tries(ts, stated)), ts.refusing(), Verdict.NOT_PROVED
     every = [(ts, within) for within in wanted]
-    if refusing.refuses and wanted and not proof.needs_admission((Sort.REQUIREMENT, "", stated.name)):
+    if refusing.refuses and wanted and not proof.needs_admission(of_requirement(stated.name)):
         # what a refused cycle asks for may take longer
         longer = replace(wanted[-1], most=2 * wanted[-1].most + 1, exact=False)
         every = [*((refusing, within) for within in (*wanted, longer)), *every]
@@ -256,20 +270,16 @@ def _in_each_cycle(ts: TransitionSystem, effort: Effort, cache: Cache | None) ->
     )
 
 
-def prove_again(
-    ts: TransitionSystem, known: LevelProof, effort: Effort, *, more_stated: bool = False
-) -> LevelProof:
+def prove_again(ts: TransitionSystem, known: LevelProof, effort: Effort) -> LevelProof:
     """Prove a level in its one environment, of which another version is proved: its clauses are the first that the search tries.
 
     Args:
         ts: The level, refusing inputs or not as that version does.
         known: The proof of that version.
         effort: For the search.
-        more_stated: Whether the version is this one, with less stated of it: what is proved there is not shown again.
     """
     begun = Candidates(FoundInvariant(known.predicates, known.clauses).named, content(ts))
-    shown = _Refusing(known, stands=True) if more_stated else None
-    return _proved(ts, effort, None, begin(ts, (), effort), begun, shown)
+    return _proved(ts, effort, None, begin(ts, (), effort), begun)
 
 
 @dataclass(frozen=True, slots=True)
@@ -682,8 +692,7 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     else:
         scripts = _certificate(ts.refusing(), proof, limits)
     for bound in proof.bounds:
-        bounded = bounded_by(ts if bound.admitting else ts.refusing(), waiting(ts)[bound.name], bound.within)
-        others = _certificate(bounded, bound.proof, limits)
+        others = _certificate(bound.level(ts), bound.proof, limits)
         scripts |= {f"requirement {bound.name} {name}": text for name, text in others.items()}
     return scripts
 

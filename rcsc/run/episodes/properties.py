@@ -149,7 +149,10 @@ class LevelProperty:
 
 @dataclass(slots=True)
 class LevelRequirement:
-    """A requirement over time that a program declares. Each cycle of the level is one of the run, a refused one, too."""
+    """What a program requires over time, or assumes of what comes from outside: where that is broken, no level is at fault.
+
+    Each cycle of the level is one of the run, a refused one, too.
+    """
 
     level: str
     its: LevelWatch
@@ -160,33 +163,17 @@ class LevelRequirement:
         if self.level in cycle.restarted:
             self.its.watch.begin()
         if level in cycle.ran and (shown := self.its.broken(cycle.left[self.level], level.values)):
+            yield self._broken(level, shown)
+
+    def _broken(self, level: RunningLevel, shown: str) -> Broken:
+        stated = self.its.stated
+        if not stated.assumed:
             where = level.ran if level.level.stages else f"line `{level.line}`"
-            stated = self.its.stated
-            yield Broken(
-                f"{self.level}: {stated.name}", f"`{stated.text}` is broken in {where}: {shown}", self.level
-            )
-
-
-@dataclass(slots=True)
-class EnvironmentKeeps:
-    """What a program assumes over time of what comes from outside: where it is broken, no level is at fault."""
-
-    level: str
-    its: LevelWatch
-
-    def watch(self, cycle: Cycle) -> Iterator[Broken]:
-        """Yield the values of the cycle that breaks it."""
-        level = cycle.levels[self.level]
-        if self.level in cycle.restarted:
-            self.its.watch.begin()
-        if level in cycle.ran and (shown := self.its.broken(cycle.left[self.level], level.values)):
-            stated = self.its.stated
-            text = f"what comes from outside does not keep `{stated.text}`: {shown}"
-            inputs = (
-                name for name in self.its.reads if level.sign.leaves[level.sign.index[name]].kind == "input"
-            )
-            name = f"{self.level}: assumption {stated.name}"
-            yield Broken(name, text, self.level, tuple(inputs), outside=True)
+            text = f"`{stated.text}` is broken in {where}: {shown}"
+            return Broken(f"{self.level}: {stated.name}", text, self.level)
+        text = f"what comes from outside does not keep `{stated.text}`: {shown}"
+        inputs = tuple(name for name, at in self.its.reads.items() if level.sign.leaves[at].kind == "input")
+        return Broken(f"{self.level}: assumption {stated.name}", text, self.level, inputs, outside=True)
 
 
 def _inputs_of(level: RunningLevel, taken: Values, left: Values) -> Values:
@@ -385,9 +372,7 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
     """
     watching: list[Property] = [ExecutorsAgree(), NoStateTableError(), Refuses(), AssumptionsHold(stand)]
     for name, program in stand.programs.items():
-        sign = stand.signs[name]
-        watching += [EnvironmentKeeps(name, watch_of(stated, sign)) for stated in program.environment]
-        watching += [_of_level(name, stand.signs[name], stated) for stated in program.properties]
+        watching += [_of_level(name, stand.signs[name], stated) for stated in program.stated]
     for link in stand.links:
         sign = stand.signs[link.level]
         at = sign.record(link.report.partition(".")[2]).start

@@ -20,7 +20,7 @@ from rcsc.base.host.files.read import json_of
 from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
 from rcsc.code.testing.figures import counted
-from rcsc.compose.proof.standing import KnownVerdict
+from rcsc.compose.proof.standing import KnownSystem, KnownVerdict
 from rcsc.driver.compile import Generated, code_of, files_of, files_of_system, planned, systems_in, tables_in
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
@@ -184,15 +184,23 @@ def property_proofs(program: Program, cache: Cache) -> Mapping[str, str]:
 def covered_of(program: Program, cache: Cache) -> "Coverage | None":
     """Return what an earlier `rcsc prove --coverage` found of the level of a program, as it is; None where nobody asked."""
     levels = {one.name: os.path.realpath(one.span.file) for one in program.levels}
-    for system in systems_above(program.file) if levels and program.properties else ():
-        there = cache_of(Path(system).parent, cache)
-        standing = known_of(system, there)
-        if standing is None:
-            continue
-        from rcsc.compose.coverage.kept import recalled  # it takes a while, and most are asked without
+    known = _standing(program, cache) if levels and program.properties else None
+    if known is None:
+        return None
+    from rcsc.compose.coverage.kept import recalled  # it takes a while, and most are asked without
 
-        here = (one for one in standing.outline.levels if levels.get(one.name) == one.file)
-        return next((found for one in here if (found := recalled(there, one.content)) is not None), None)
+    system, standing = known
+    there = cache_of(system.parent, cache)
+    here = (one for one in standing.outline.levels if levels.get(one.name) == one.file)
+    return next((found for one in here if (found := recalled(there, one.content)) is not None), None)
+
+
+def _standing(program: Program, cache: Cache) -> tuple[Path, KnownSystem] | None:
+    """Return the nearest system above a program whose levels were proved together, with what is known of them."""
+    for system in systems_above(program.file):
+        standing = known_of(system, cache_of(system.parent, cache))
+        if standing is not None:
+            return system, standing
     return None
 
 
@@ -227,17 +235,16 @@ def _unspoken_of(program: Program, coverage: "Coverage") -> Iterator[tuple[Span,
 
 def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
     own = {one.name: os.path.realpath(one.span.file) for one in program.properties}
-    for system in systems_above(program.file):
-        standing = known_of(system, cache_of(Path(system).parent, cache))
-        if standing is None:
-            continue
-        for level in standing.outline.levels:
-            for key, file in level.properties:
-                if own.get(key[2]) == file:
-                    state = standing.of_obligation(level.name, key)
-                    if state in _SAID:
-                        yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
+    known = _standing(program, cache)
+    if known is None:
         return
+    system, standing = known
+    for level in standing.outline.levels:
+        for key, file in level.properties:
+            if own.get(key[2]) == file:
+                state = standing.of_obligation(level.name, key)
+                if state in _SAID:
+                    yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
 
 
 def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
