@@ -58,6 +58,6 @@ Further assumptions:
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
 Z3 confirms), `exact` (engines for what that leaves open), `proof` (of a level, and of the system), `counterexample` (runs that break what
-is not proved), `coverage` (what requirements speak of). Trusted are `contract.transition`, `symbolic.keyed` and `symbolic.measured` (a
-cycle as terms), the arguments here and in `proof.termination`, Z3; not the search.
+is not proved), `coverage` (what requirements speak of), `together` (requirements across levels). Trusted are `contract.transition` and
+`together.product`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, Z3.
 """

@@ -12,6 +12,7 @@ from rcsc.driver.settings import Proof, Settings
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import closure, resolve
+from rcsc.lang.syntax.tree import Declaration, PropertyDecl, RequirementDecl
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +71,21 @@ def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterat
         if isinstance(program, Program):
             yield prove(root, program, loaded, settings.options, cache)
         else:
-            yield Proof(root, program)
+            yield Proof(root, _across(root, loaded, program))
     settings.progress("")
+
+
+def _across(root: str, loaded: Loaded, found: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """Return what is wrong with a file that is no program: less, where it states requirements across the levels of a system."""
+    if not any(isinstance(each, RequirementDecl | PropertyDecl) for each in _declared(root, loaded)):
+        return found
+    from rcsc.compose.together.words import told_across  # keep lazy: few files state such
+
+    return told_across(root, loaded, found)
+
+
+def _declared(root: str, loaded: Loaded) -> tuple[Declaration, ...]:
+    return loaded.files[root].declarations if root in loaded.files else ()
 
 
 def _runs(program: Program) -> bool:

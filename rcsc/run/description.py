@@ -57,6 +57,7 @@ SYSTEM = Record(
         "displays": Entries(Listing(Member())),
         "outside": Listing(Word()),
         "plant": Entries(Anything()),
+        "requirements": Text(),
         "script": Text(),
         "campaign": Record({}, {"within": Number(1, MOST_WITHIN, whole=True)}),
     },
@@ -111,6 +112,7 @@ class Description:
         data_python: `MODULE:NAME` of who knows the data (`rcsc.views.pages.data`); empty for nobody.
         script: The orders that are given when nobody says which; None where the description names none.
         within: Cycles without a fault in which every command from outside is to end when the system is tested.
+        requirements: The file that says what the levels have to do together; None where the description names none.
     """
 
     name: str
@@ -125,6 +127,7 @@ class Description:
     script: Path | None = None
     data_python: str = ""
     within: int = WITHIN
+    requirements: Path | None = None
 
     def unfilled(self, inputs: Iterable[str]) -> tuple[str, ...]:
         """Return those of these inputs, `level.variable`, that no buffer and no feed fills: they keep their initial values."""
@@ -164,11 +167,15 @@ def description(path: Path) -> Description:
         document = replace(document, value={**document.value, "buffers": buffers})
         _check_parties(document)
     generated, data = (_place(path, document, key) for key in ("generated", "data"))
-    script = _place(path, document, "script") if isinstance(document.value.get("script"), str) else None
+    script, requirements = (
+        _place(path, document, key) if isinstance(document.value.get(key), str) else None
+        for key in ("script", "requirements")
+    )
     declared = plants(path, document)
     if document.faults:
         raise document.bad(BadDescription)
-    return replace(_described(path, document, generated, data), plants=declared, script=script)
+    whole = _described(path, document, generated, data)
+    return replace(whole, plants=declared, script=script, requirements=requirements)
 
 
 def _root(path: Path, level: Mapping[str, Any]) -> Path | None:

@@ -1062,6 +1062,19 @@ class Code(StrEnum):
         output speed : int 0 .. 100
         assume stops : when speed = 0, within 10 cycles, not rolls
     """
+    NOT_ACROSS = """RCS325: a declaration that a file of requirements across levels cannot have
+
+    The file that a system names as `requirements` speaks of the variables of all levels, `LEVEL.VARIABLE`, and of what comes from
+    outside, `PARTY.VARIABLE`. It states properties, requirements and assumptions over time, and may name constants, sets and types for
+    them; variables, tables, modules and levels are declared in the tables of a level.
+
+        state moving : bool
+        requirement one : always not moving
+
+    error: a file of requirements across levels states requirements and properties, and assumptions over time
+
+        requirement one : always not drive.moving
+    """
     GAP = """RCS401: an input that no line matches
 
     Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least

@@ -150,7 +150,8 @@ def of_requirement(name: str) -> ObligationKey:
 def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
     """List all obligations of a level, those of its tables first; or the one that is asked about (`TransitionSystem.only`)."""
     if ts.only is not None:
-        return tuple(owed for owed in _stated(ts, cycle) if owed.key == of_requirement(ts.only))
+        about = {of_requirement(ts.only), (Sort.PROPERTY, "", ts.only)}
+        return tuple(owed for owed in _stated(ts, cycle) if owed.key in about)
     return (
         *_tables(cycle),
         *_upward(ts, cycle),

@@ -10,7 +10,6 @@ condition (a division by zero, an index out of range) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from itertools import product
 
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.predicates import (
@@ -161,21 +160,39 @@ def every_predicate(
 
 
 def _side_by_side(ts: TransitionSystem, inside: frozenset[str]) -> Iterator[Predicate]:
-    """Make predicates of how far a counter of a monitor is ahead of one of the level: they often go up together, in a cycle or the next."""
     numbers = {below.number for below in ts.links.below}  # which go round
-    others = [(name, kind) for name, kind in _counters(ts.program) if name in inside and name not in numbers]
-    for _, monitor in monitors(ts.program):
+    others = [(name, kind) for name, kind in counters(ts.program) if name in inside and name not in numbers]
+    yield from side_by_side(ts.program, others, inside)
+
+
+def side_by_side(
+    program: Program, others: Collection[tuple[VariableName, Int]], inside: frozenset[str]
+) -> Iterator[Predicate]:
+    """Make predicates of how far a counter of a monitor is from one of a level.
+
+    They often go up together, in a cycle or the next: then one is never ahead of the other. Or one goes down from its greatest value as the
+    other goes up: then both together stay below that.
+    """
+    for _, monitor in monitors(program):
         for state in monitor.states:
-            if isinstance(state.type, Int) and state.name in inside:
-                for (name, kind), ahead in product(others, range(MOST_AHEAD + 1)):
-                    at_most = Apply(
-                        Op.ADD, (Read(name, kind), number(ahead)), Int(kind.low, kind.high + ahead)
-                    )
-                    condition = Apply(Op.LE, (Read(state.name, state.type), at_most), Bool())
-                    yield Predicate(spelled(condition), Bool(), condition=condition)
+            if not isinstance(state.type, Int) or state.name not in inside:
+                continue
+            mine = Read(state.name, state.type)
+            for name, kind in others:
+                other, low, high = Read(name, kind), kind.low + state.type.low, kind.high + state.type.high
+                both = Apply(Op.ADD, (mine, other), Int(low, high))
+                for ahead in range(MOST_AHEAD + 1):
+                    at_most = Apply(Op.ADD, (other, number(ahead)), Int(kind.low, kind.high + ahead))
+                    yield _named(Apply(Op.LE, (mine, at_most), Bool()))
+                for beyond in range(-1, MOST_AHEAD):
+                    yield _named(Apply(Op.LE, (both, number(state.type.high + beyond)), Bool()))
 
 
-def _counters(program: Program) -> Iterator[tuple[VariableName, Int]]:
+def _named(condition: Expr) -> Predicate:
+    return Predicate(spelled(condition), Bool(), condition=condition)
+
+
+def counters(program: Program) -> Iterator[tuple[VariableName, Int]]:
     """List the states of a level that its statements count up or down."""
     counted = {v.name for v in program.variables if v.counts is not None}
     for procedure in program.procedures:
@@ -210,15 +227,15 @@ def _looked_at(program: Program) -> Iterator[Expr]:
 
     A counter of the level and one of a monitor often go up together; so each number of both is told apart.
     """
-    counters: list[tuple[VariableName, Scalar]] = []
+    counting: list[tuple[VariableName, Scalar]] = []
     for _, monitor in monitors(program):
         yield from (truth for _, truth in monitor.truths)
         for statement in everything(monitor.statements):
             yield from expressions(statement)
-        counters += [(state.name, state.type) for state in monitor.states if isinstance(state.type, Int)]
-    if counters:
-        counters += [(v.name, v.type) for v in program.variables if v.kind is not Kind.INPUT]
-    for name, kind in counters:
+        counting += [(state.name, state.type) for state in monitor.states if isinstance(state.type, Int)]
+    if counting:
+        counting += [(v.name, v.type) for v in program.variables if v.kind is not Kind.INPUT]
+    for name, kind in counting:
         if isinstance(kind, Int) and (name.startswith(WATCHED) or kind.high - kind.low <= MOST_COUNTED):
             for value in range(kind.low + 1, min(kind.high, kind.low + MOST_COUNTED) + 1):
                 yield Apply(Op.GE, (Read(name, kind), Literal(value, Int(value, value, kind.unit))), Bool())

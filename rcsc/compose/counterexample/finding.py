@@ -12,7 +12,7 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle, seen_by_table
 from rcsc.compose.counterexample.trace import Trace
 from rcsc.lang.interpret import Fault, initial
-from rcsc.lang.model import Value, key_bounds, key_of, spell
+from rcsc.lang.model import Scalar, Value, key_bounds, key_of, spell
 from rcsc.run.description import Description
 
 
@@ -267,7 +267,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, said: str) -> TimeLine
     """Return the row of one cycle, with only the leaves that change."""
     kinds = ts.kinds
     changed = {
-        name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
+        name: _spelled(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
     }
     takes = {name: text for name, text in changed.items() if name in step.taken}
     takes |= dict(_answers(ts, step))
@@ -293,14 +293,19 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, said: str) -> TimeLine
     )
 
 
+def _spelled(kind: Scalar, value: Value) -> str:
+    """Spell what came from outside: what is refused has no words of its type."""
+    low, high = key_bounds(kind)
+    inside = value == value and low <= key_of(kind, value) <= high  # noqa: PLR0124  # no NaN
+    return spell(kind, value) if inside else f"{value}, refused"
+
+
 def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
     """Spell the results of extern procedures, call by call; refused values have no words of their type."""
     for procedure, given in step.answers:
         writes = next(declared.writes for declared in ts.program.procedures if declared.name == procedure)
         for leaf, value in zip(writes, given, strict=True):
-            low, high = key_bounds(ts.kinds[leaf])
-            inside = value == value and low <= key_of(ts.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN
             yield (
                 f"{leaf} from {procedure}",
-                spell(ts.kinds[leaf], value) if inside else f"{value}, refused",
+                _spelled(ts.kinds[leaf], value),
             )

@@ -27,6 +27,7 @@ from rcsc.lang.project import project_root
 from rcsc.proof.solvers.options import Options
 from rcsc.proof.table.program import prove_program
 from rcsc.run import answers
+from rcsc.run.adopt import Begun, Restarted
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.levels import RunningLevel, running_level
@@ -241,7 +242,10 @@ def _cycles(
     """
     for tick, steps in enumerate(finding.ticks, 1):
         ran = tuple(level for level in running.levels if level.name in steps)
+        running.restarts.clear()
         for level in ran:
+            if steps[level.name].anew and tick > 1:
+                _begin_anew(running, level, steps[level.name])
             _take(running, level, systems[level.name], steps[level.name])
             answers.told(level.executor, steps[level.name].answers)
             level.run()
@@ -250,6 +254,14 @@ def _cycles(
                 raise ExecutorsDifferError(beside)
         running.tick = tick
         yield ran
+
+
+def _begin_anew(running: System, level: RunningLevel, step: CycleRun) -> None:
+    """Put a level into the state in which it begins anew within a run, before it takes anything."""
+    count = len(level.sign.leaves)
+    stands = tuple(step.before[leaf.name] for leaf in level.sign.leaves)
+    level.put_back((*stands, *level.values[count:]))
+    running.restarts.append(Restarted(level.name, Begun.ANEW, stands))
 
 
 def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: CycleRun) -> None:

@@ -549,6 +549,33 @@ def _confirm(asked: Confirmation, clauses: Sequence[Clause], known: Container[Cl
         raise NotConfirmedError
 
 
+def confirm_owed(
+    found: FoundInvariant,
+    firsts: tuple[Cycle, ...],
+    cycle: Cycle,
+    owed: Sequence[Sequence[Obligation]],
+    limits: Limits,
+    *,
+    known: Container[Clause] = (),
+    exact: bool = False,
+) -> None:
+    """Have an invariant confirmed, and that no cycle breaks an obligation: of the first cycles each, then of a later one.
+
+    The `known` clauses are an invariant already.
+
+    Raises:
+        NotConfirmedError: It is no invariant, some cycle breaks one, or the solver gave up.
+    """
+    asked = _asked_anew(found.predicates, firsts, cycle, limits, exact=exact)
+    _confirm(asked, found.clauses, known)
+    solvers = [*(asked.beginning(first) for first in firsts), asked.known(found.clauses)]
+    for solver, every in zip(solvers, owed, strict=True):
+        broken = smt.any_of([asked.keyed.term(values.negation(one.holds)) for one in every])
+        solver.add(*asked.keyed.ranges)
+        if answer(solver, broken) is not Answer.UNSATISFIABLE:
+            raise NotConfirmedError
+
+
 def _confirmed(question: Solver, steps: int, seed: int) -> bool:
     """Return whether Z3 refutes a question, in one search; false where it gives up.
 

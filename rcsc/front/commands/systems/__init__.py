@@ -11,7 +11,7 @@ Nothing here is trusted for a verdict. What it costs: what moves a model imports
 their package; each says which extra brings it.
 
 Modules: `prove` says again what is known of the levels together, else `proving` proves them, `explained` says what
-it does not prove and `covering` what requirements speak of; `run` runs a system with its plant, `campaign` many
+it does not prove, `covering` what requirements speak of and `across` how those across levels stand; `run` runs a system with its plant, `campaign` many
 episodes of it, `shell` puts a system under somebody's hands; `log` says what a recorded run did and `replay` runs it
 again; `db` is about the cell's database.
 """

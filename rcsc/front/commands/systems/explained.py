@@ -188,6 +188,17 @@ def _say_logs(explanation: Explanation) -> None:
         attach("note", f"the runs of what follows, N from 1 to {len(explanation.follows)}: {then}")
 
 
+def say_run(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> None:
+    """Print the run of an explanation, and where it is kept."""
+    if explanation.beside:
+        say_error(Code.NOT_REPRODUCED, f"the trace found does not run: {explanation.obligation.shown}")
+        for line in explanation.beside:
+            attach("note", line)
+    else:
+        _say_finding(systems, explanation)
+    _say_logs(explanation)
+
+
 def _stated(systems: Mapping[str, TransitionSystem], explanation: Explanation) -> str:
     """Return the source text of a property, requirement or assumption over time, or "" where it is none."""
     if explanation.obligation.sort not in {Sort.PROPERTY, Sort.REQUIREMENT, Sort.KEPT}:

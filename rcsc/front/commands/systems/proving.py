@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,12 +58,15 @@ from rcsc.front.commands.shared.proved import (
 )
 from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, wants_color
 from rcsc.front.commands.shared.stopped import say_error
+from rcsc.front.commands.systems import across
 from rcsc.front.commands.systems.covering import coverage_as_json, lines_of
 from rcsc.front.commands.systems.explained import explanation_as_json, say_exercise, say_explanation
 from rcsc.lang.model import Kind
 from rcsc.proof.solvers.options import Limits
 from rcsc.run.description import Description, description
 
+ACROSS = "requirements across levels"
+"""What the files of these are kept under, among those of the levels' programs, none of which has a blank in its name."""
 _WORTH_PROCESSES = 40
 """Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
 
@@ -122,8 +125,14 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
     if asked.certificate is not None:
         _write(asked.certificate, systems, proof)
+    given = None
+    if not asked.only and not asked.variants:
+        given = _across(systems, proof, settings, cache, asked)
+    if given is not None:
+        sources |= given.loaded.sources
+        loaded = {**loaded, ACROSS: given.loaded}
     if not asked.as_json:
-        _say(_lines(path, systems, proof, asked, sources))
+        _say(_lines(path, systems, proof, asked, sources, _More(given=given)))
     coverages = {
         level.level: made(cache, systems[level.level], level, loaded[programs[level.level]])
         for level in proof.levels
@@ -131,22 +140,46 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     }
     if not asked.as_json:
         _say(line for each in coverages.values() for line in lines_of(each, sources))
+    if given is not None and not asked.as_json:
+        across.say_runs(systems, given)
     explanations = _explanations(path, systems, proof, asked, settings)
     if asked.as_json:
         found = [explanation_as_json(systems, explanation, settings) for explanation in explanations]
-        _say(_lines(path, systems, proof, asked, sources, found, coverages))
+        _say(_lines(path, systems, proof, asked, sources, _More(found, coverages, given)))
     for agreement in (each for each in proof.agreements if not each.holds):
         say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
     refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
-    if refused or any(explanation.bug for explanation in explanations):
+    if refused or any(explanation.bug for explanation in explanations) or across.beside(given):
         return 3
     status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
     status = max(status, summary(proof).status(strict=asked.strict))
+    if given is not None:
+        status = max(status, across.status(proof, systems, given, strict=asked.strict))
     if cache is not None and not status and not explanations and not asked.coverage:
         keep_lines(
-            cache, path, key, tuple(_lines(path, systems, _recalled(proof), asked, sources)), stood, loaded
+            cache,
+            path,
+            key,
+            tuple(_lines(path, systems, _recalled(proof), asked, sources, _More(given=given))),
+            stood,
+            loaded,
         )
     return status
+
+
+def _across(
+    systems: Mapping[str, TransitionSystem],
+    proof: SystemProof,
+    settings: TraceSettings,
+    cache: Cache | None,
+    asked: Asked,
+) -> across.Answers | None:
+    """Answer the requirements across levels; none where the system states none."""
+    try:
+        return across.answers(systems, proof, settings, cache)
+    except OSError as error:
+        place = str(error.filename or asked.logs)
+        raise UnwritableError(place, error.strerror or "no reason given") from error
 
 
 def shown_by_runs(path: Path, names: tuple[str, ...], length: int | None) -> int:
@@ -216,19 +249,32 @@ def _recalled(proof: SystemProof) -> SystemProof:
     return replace(proof, levels=tuple(replace(level, cached=True) for level in proof.levels), seconds=0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class _More:
+    """What is told beside the levels' claims: runs and coverage as JSON, the answers to requirements across levels."""
+
+    findings: Sequence[dict[str, Any]] = ()
+    coverages: Mapping[str, Coverage] = field(default_factory=dict)
+    given: across.Answers | None = None
+
+
 def _lines(
     path: Path,
     systems: dict[str, TransitionSystem],
     proof: SystemProof,
     asked: Asked,
     sources: Sources,
-    findings: Sequence[dict[str, Any]] = (),
-    coverages: Mapping[str, Coverage] | None = None,
+    more: _More,
 ) -> Iterator[str]:
     """Yield the lines to print of a proof; findings and coverage are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
-        yield json.dumps(_as_json(proof, systems, sources, findings, coverages or {}), indent=2)
+        of_all = _as_json(proof, systems, sources, more.findings, more.coverages)
+        if more.given is not None:
+            of_all["requirements"] = across.as_json(systems, proof, more.given)
+        yield json.dumps(of_all, indent=2)
         return
+    if more.given is not None:
+        yield from across.lines_of(systems, proof, more.given)
     yield summary(proof).line(strict=asked.strict)
     for level_proof in proof.levels:
         yield from _of_level(systems[level_proof.level], proof, level_proof)

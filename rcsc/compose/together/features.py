@@ -1,0 +1,92 @@
+"""What invariants of levels together may speak of: the predicates of each level, what requirements compare, and what stands in buffers.
+
+In: levels that run together, a tick from any state, conditions to be proved. Out: `Predicate`s in their cone.
+
+The predicates of a level are those of its own proof, about its leaves in the product. Besides: whether an output is what its reader
+compares the input with, as an order's number with the one that the level below took last; and whether an output is what the input was.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from rcsc.compose.contract.predicates import CLOSELY, Predicate, compared, cone, listed
+from rcsc.compose.contract.properties import counters, every_predicate, side_by_side
+from rcsc.compose.contract.transition import Cycle, Leaves
+from rcsc.compose.together.product import Together
+from rcsc.lang.model import Bool, Int, VariableName
+from rcsc.proof.symbolic.values import Node
+
+
+@dataclass(frozen=True, slots=True)
+class OfMember(Predicate):
+    """A predicate of a level, about its leaves among those of all levels."""
+
+    member: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name in the tables' words, after the level's."""
+        return f"{self.member}: {Predicate.name.fget(self)}"  # type: ignore[attr-defined]
+
+    def node(self, leaves: Leaves) -> Node:
+        """Return its value in a state of all levels."""
+        prefix = f"{self.member}."
+        own = {name.removeprefix(prefix): node for name, node in leaves.items() if name.startswith(prefix)}
+        return Predicate.node(self, own)
+
+
+def features(
+    ts: Together, cycle: Cycle, wanted: Iterable[Node], closely: int = CLOSELY
+) -> tuple[Predicate, ...]:
+    """Choose the predicates in the cone of the conditions."""
+    reads = [*wanted, cycle.contract]
+    inside = cone(cycle, reads)
+    own = every_predicate(ts, cycle, reads, closely)
+    chosen = (*own, *_of_members(ts, inside, closely), *_of_buffers(ts, inside))
+    if closely == CLOSELY:
+        chosen = (*chosen, *side_by_side(ts.program, tuple(_counters(ts, inside)), inside))
+    return unlike(chosen)
+
+
+def unlike(every: Iterable[Predicate]) -> tuple[Predicate, ...]:
+    """Return predicates without those of a name that came before."""
+    by_name: dict[str, Predicate] = {}
+    for one in every:
+        by_name.setdefault(one.name, one)
+    return tuple(by_name.values())
+
+
+def _of_members(ts: Together, inside: frozenset[str], closely: int) -> Iterator[Predicate]:
+    for name, member in ts.members.items():
+        alone = member.cycle(member.havoc())
+        read = [node for leaf, node in alone.before.items() if f"{name}.{leaf}" in inside]
+        yield from (of_member(one, name) for one in every_predicate(member, alone, read, closely))
+
+
+def of_member(one: Predicate, name: str) -> OfMember:
+    """Return a predicate of a level, as one of all levels."""
+    return OfMember(one.leaf, one.kind, one.other, one.module, one.condition, one.parts, one.procedures, name)
+
+
+def _counters(ts: Together, inside: frozenset[str]) -> Iterator[tuple[VariableName, Int]]:
+    for name, member in ts.members.items():
+        numbers = {below.number for below in member.links.below}
+        for leaf, kind in counters(member.program):
+            if leaf not in numbers and f"{name}.{leaf}" in inside:
+                yield VariableName(f"{name}.{leaf}"), kind
+
+
+def _of_buffers(ts: Together, inside: frozenset[str]) -> Iterator[Predicate]:
+    for name, member in ts.members.items():
+        pairs = set(compared(member.program))
+        for leaf in member.inputs:
+            source = ts.sources.get(f"{name}.{leaf}")
+            if source is None or source.party not in ts.members:
+                continue
+            given = f"{source.party}.{source.leaf}"
+            others = {b if a == leaf else a for a, b in pairs if leaf in (a, b)}
+            for other in sorted(f"{name}.{one}" for one in (leaf, *others)):
+                if {given, other} <= inside and ts.kinds[given] == ts.kinds[other]:
+                    yield Predicate(given, Bool(), other)
+            if listed(ts.kinds[given]) and given in inside:
+                yield Predicate(given, ts.kinds[given])

@@ -1,0 +1,166 @@
+"""A run of all levels, as the interpreter does it: the circuit says what comes from outside, and nothing else of it is believed.
+
+In: levels together, a run of their circuit. Out: for each tick the cycles of the levels that ran in it, and whether the last breaks the
+requirement, by its monitor stepped along the run. `rerun` repeats the same on the Python and the C executors.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from rcsc.compose.contract.given import refused
+from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
+from rcsc.compose.exact.circuit import Circuit
+from rcsc.compose.exact.explicit import Run
+from rcsc.compose.together.product import Tick, Together
+from rcsc.lang.interpret import UNDEFINED, Fault, holds, initial
+from rcsc.lang.model import Property, Value, earlier, value_of_key
+from rcsc.lang.over_time.run import Watch
+from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
+from rcsc.proof.symbolic.values import Node
+
+State = dict[str, Value]
+Ticks = tuple[Mapping[str, CycleRun], ...]
+
+
+@dataclass(slots=True)
+class Playing:
+    """Levels that run tick by tick on the interpreter.
+
+    Attributes:
+        now: The leaves of each level; its inputs as it last took them, admitted or not.
+        found: The states of the monitors of its own requirements; None where they begin.
+        admitted: The inputs of each as it last took them: what is refused is not taken.
+    """
+
+    ts: Together
+    now: dict[str, State] = field(init=False)
+    found: dict[str, Mapping[str, Value] | None] = field(init=False)
+    admitted: dict[str, State] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.now = {name: dict(initial(member.program)) for name, member in self.ts.members.items()}
+        self.found = dict.fromkeys(self.now)
+        self.admitted = {
+            name: {leaf: self.now[name][leaf] for leaf in member.inputs}
+            for name, member in self.ts.members.items()
+        }
+
+    @property
+    def state(self) -> State:
+        """What requirements read: the leaves of all levels, and of what stands outside."""
+        state = {
+            f"{name}.{leaf}": value
+            for name, now in self.now.items()
+            for leaf, value in {**now, **self.admitted[name]}.items()
+        }
+        return state | {mine: state[same] for mine, same in self.ts.aliases if same in state}
+
+    def tick(self, asked: Mapping[str, "Asked"]) -> dict[str, CycleRun]:
+        """Run a tick: each level takes what the tick before left."""
+        stood = {name: dict(now) for name, now in self.now.items()}
+        return {
+            name: step
+            for name in self.ts.members
+            if (step := self._level(name, asked[name], stood)) is not None
+        }
+
+    def _level(self, name: str, asked: "Asked", stood: Mapping[str, State]) -> CycleRun | None:
+        member, before = self.ts.members[name], dict(self.now[name])
+        taken = {leaf: self.admitted[name][leaf] for leaf in member.inputs} | dict(asked.taken)
+        if not asked.first:
+            for end, source in self.ts.wired.items():
+                (reader, _, leaf), (writer, _, output) = end.partition("."), source.partition(".")
+                if reader == name:
+                    taken[leaf] = stood[writer][output]
+        if not asked.due:
+            return None
+        if asked.anew:
+            before, self.found[name] = begun_anew(self.ts, name, before, taken), None
+        if asked.refused:
+            leaf = member.refusable[0]
+            taken[leaf] = refused(member.program.variable(leaf))
+        step = one_cycle(member, before, taken, (), self.found[name])
+        self.now[name], self.found[name] = dict(step.after), step.left
+        if step.fault is not Fault.ADMIT:
+            self.admitted[name] = {leaf: step.after[leaf] for leaf in member.inputs}
+        return replace(step, anew=asked.anew)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What befalls a level in a tick; `taken`, those inputs that are told."""
+
+    due: bool
+    anew: bool
+    refused: bool
+    taken: Mapping[str, Value]
+    first: bool
+
+
+def begun_anew(ts: Together, name: str, stood: State, taken: State) -> State:
+    """Return the state in which a level begins anew, as `run.adopt.restart` makes it."""
+    program = ts.members[name].program
+    start = {**initial(program), **taken}
+    for leaf, adopted in program.adopted.items():
+        match adopted:
+            case Fixed(value):
+                start[leaf] = value
+            case SameAs(other):
+                start[leaf] = start[other]
+            case Stands():
+                start[leaf] = stood[leaf]
+            case After():
+                start[leaf] = (int(stood[leaf]) + 1) % NUMBERS
+    return start
+
+
+def played(ts: Together, made: Circuit, run: Run, stated: Property) -> Ticks | None:
+    """Run a run of the circuit; None where the interpreter does not break the requirement in its last tick, and in no tick before.
+
+    Args:
+        ts: The levels.
+        made: Their circuit.
+        run: Of it.
+        stated: The requirement that it breaks.
+    """
+    playing, watch = Playing(ts), Watch(stated) if stated.monitor is not None else None
+    environment = [Watch(one) for one in ts.program.environment]
+    ticks, kept = list[Mapping[str, CycleRun]](), True
+    for number, given in enumerate(run.given):
+        if not kept:
+            return None
+        tick = made.step.cycle if number else made.firsts[run.begins].cycle
+        assert isinstance(tick, Tick)
+        before = playing.state
+        ticks.append(playing.tick({name: _asked(ts, tick, name, given, number) for name in ts.members}))
+        after = playing.state
+        if any(step.ends_the_run for step in ticks[-1].values()):
+            return None
+        if not all(one.keeps(before, after) for one in environment):
+            return None
+        kept = _keeps(stated, watch, before, after)
+    return None if kept else tuple(ticks)
+
+
+def _keeps(stated: Property, watch: Watch | None, before: State, after: State) -> bool:
+    if watch is not None:
+        return watch.keeps(before, after)
+    try:
+        return holds(stated.condition, {**after, **{str(earlier(leaf)): v for leaf, v in before.items()}})
+    except UNDEFINED:
+        return False
+
+
+def _asked(ts: Together, tick: Tick, name: str, given: Mapping[str, int], number: int) -> Asked:
+    """Read what befalls a level in a tick; what the run does not tell stays as it is, and does not happen."""
+    taken = {
+        leaf: value_of_key(node.kind, given[node.name])
+        for leaf, node in tick.takes[name].items()
+        if node.name in given
+    }
+    anew, is_refused = (_happens(of[name], given) for of in (tick.restarts, tick.refuses))
+    return Asked(number % ts.periods[name] == 0, anew, is_refused, taken, first=number == 0)
+
+
+def _happens(node: Node, given: Mapping[str, int]) -> bool:
+    return bool(node.low) if node.known else bool(given.get(node.name, 0))

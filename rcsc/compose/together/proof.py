@@ -1,0 +1,341 @@
+"""Requirements across levels proved, or refuted by a run of the whole system.
+
+In: the levels of a system, each proved alone or not, and the program of a file of requirements. Out: for each an `Across`.
+
+A requirement is tried first under *any* timing, of the levels that it names. Then under the *scheduled* one: of these levels, then with
+the levels that write to them, and so on: what is left out may do all that its contract allows, so that a proof of few levels is one of
+all, and costs what they cost. A run is looked for of all levels together, and shown only if the interpreter does it.
+
+1. short runs, by bounded search;
+2. invariants over predicates of all levels, confirmed by Z3; what these leave open goes to the exact engines (`exact.portfolio`);
+3. longer runs.
+
+What a level is proved to do alone is taken for granted of every cycle: that it goes on, and that what is read of others is as their
+contract has it. So each verdict rests on that (`claims.RUNS`), and trusts what that trusts.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+from rcsc.compose.contract.claims import RUNS, Closed, Need
+from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
+from rcsc.compose.exact.bounded import looked
+from rcsc.compose.exact.circuit import circuit
+from rcsc.compose.exact.portfolio import helped
+from rcsc.compose.invariant.cubes import Reached
+from rcsc.compose.invariant.pdr import PDR, Clause, Posed
+from rcsc.compose.invariant.search import LIMITS, FoundInvariant
+from rcsc.compose.proof.assume_guarantee import admitted
+from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
+from rcsc.compose.together.features import features, of_member, unlike
+from rcsc.compose.together.played import Ticks, played
+from rcsc.compose.together.product import Timing, Together, read_by_all, together
+from rcsc.lang.model import Program, Property
+from rcsc.lang.over_time.past import TRUE, negation
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.run.description import Description
+
+SHORT, LONG = 8, 60
+"""Ticks of the runs that are looked for before a proof is tried, and after it."""
+NO_RESTART = "no level begins anew while the system runs"
+"""What is trusted where levels do not begin anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What may befall the levels.
+
+    Attributes:
+        refuses: Whether inputs may be refused; `restarts`, whether a level may begin anew.
+    """
+
+    refuses: bool = True
+    restarts: bool = True
+
+
+EVERY = (
+    Surroundings(),
+    Surroundings(refuses=False),
+    Surroundings(restarts=False),
+    Surroundings(refuses=False, restarts=False),
+)
+"""Surroundings from the hardest on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Across:
+    """A requirement across levels, with its verdict.
+
+    Attributes:
+        timing: Under which it is proved; of a refuted or open one, the scheduled one.
+        levels: Those that its proof is about, or that run.
+        by: How it was proved, in words.
+        around: What may befall the levels there.
+        run: A run that breaks it, tick by tick, in the surroundings `broken_in`.
+        looked: No run of so many ticks breaks it there, where none is shown.
+        vacuous: Whether it is proved, too, that nothing ever asks for its response.
+    """
+
+    stated: Property
+    proved: bool = False
+    timing: Timing = Timing.SCHEDULED
+    levels: tuple[str, ...] = ()
+    by: str = ""
+    around: Surroundings = Surroundings()
+    run: Ticks = field(default=(), repr=False)
+    broken_in: Surroundings | None = None
+    looked: int = 0
+    vacuous: bool = False
+
+    @property
+    def refuted(self) -> bool:
+        """Whether a run of the system breaks it, in the surroundings in which it is not proved."""
+        return bool(self.run) and not self.proved
+
+    def trusts(self, systems: Mapping[str, TransitionSystem]) -> tuple[str, ...]:
+        """Return what is trusted of the surroundings of its levels, besides what these rest on."""
+        refused = (
+            () if self.around.refuses else (said for name in self.levels for said in admitted(systems[name]))
+        )
+        return (*refused, *(() if self.around.restarts else (NO_RESTART,)))
+
+    def closed(self, systems: Mapping[str, TransitionSystem], claims: Mapping[Need, Closed]) -> Closed:
+        """Return its verdict with all that it rests on, as claims about levels have it."""
+        from rcsc.compose.contract.claims import UNKNOWN, Verdict
+
+        rests = {(name, RUNS): claims.get((name, RUNS), UNKNOWN) for name in self.levels}
+        lacks = {need for need, each in rests.items() if not each.accepted}
+        lacks |= {other for each in rests.values() for other in each.lacks}
+        trusts = {trust for each in rests.values() for trust in each.trusts} | set(self.trusts(systems))
+        verdict = Verdict.PROVED if self.proved else Verdict.NOT_PROVED
+        return Closed(verdict, tuple(sorted(lacks)), tuple(sorted(trusts)))
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One requirement of a system.
+
+    Attributes:
+        systems: All levels, with their environments.
+        system: The description.
+        program: The requirements.
+        stated: The one that is asked about.
+        proofs: Of levels alone, those that there are: their invariants hold of the levels together, too.
+    """
+
+    systems: Mapping[str, TransitionSystem]
+    system: Description
+    program: Program
+    stated: Property
+    proofs: Mapping[str, LevelProof] = field(default_factory=dict)
+
+    @property
+    def every(self) -> tuple[str, ...]:
+        """The levels that it names, and all that write to these, directly or not."""
+        return tuple(self._reached_from(self._named(), len(self.systems)))
+
+    def answer(self) -> Across:
+        """Prove it or refute it; where it is proved, tell whether anything ever asks for its response."""
+        found = self.verdict()
+        monitor = self.stated.monitor
+        if not found.proved or monitor is None or monitor.asks == TRUE:
+            return found
+        never = replace(self.stated, condition=negation(monitor.asks))
+        program = replace(self.program, properties=(never,))
+        return replace(found, vacuous=replace(self, program=program, stated=never).verdict().proved)
+
+    def verdict(self) -> Across:
+        """Prove it or refute it."""
+        found = Across(self.stated, levels=self.every)
+        left = list[Surroundings]()
+        for around in self._surroundings():
+            if run := self._run(around, SHORT):
+                if len(run) <= len(found.run or run):  # of those as short the one in the kindest surroundings
+                    found = replace(found, run=run, broken_in=around)
+                continue
+            left.append(around)
+            for timing, names in self._parts():
+                if self._proved(timing, names, around) is not None:
+                    return self._as_proved(found, timing, names, around, "")
+        for around in left:
+            by = self._proved(Timing.SCHEDULED, self._named(), around, exact=True)
+            if by is not None:
+                return self._as_proved(found, Timing.SCHEDULED, self._named(), around, by)
+            if not found.run and (run := self._run(around, LONG)):
+                found = replace(found, run=run, broken_in=around)
+        return found if found.run else replace(found, looked=LONG)
+
+    def _surroundings(self) -> Iterator[Surroundings]:
+        """Yield what may befall the levels, the hardest first."""
+        refuse = any(self.systems[name].refusing().refuses for name in self.every)
+        yield from (around for around in EVERY if refuse or around.refuses)
+
+    @staticmethod
+    def _as_proved(
+        found: Across, timing: Timing, names: tuple[str, ...], around: Surroundings, by: str
+    ) -> Across:
+        return replace(found, proved=True, timing=timing, levels=names, around=around, by=by)
+
+    # --- proofs ---
+
+    def _proved(
+        self, timing: Timing, names: Sequence[str], around: Surroundings, *, exact: bool = False
+    ) -> str | None:
+        return proved(self._together(names, timing, around), tuple(self._lemmas(names, around)), exact=exact)
+
+    def _lemmas(self, names: Iterable[str], around: Surroundings) -> Iterator["Lemma"]:
+        """Yield the invariants of these levels, each proved of the level alone, in surroundings that are as hard."""
+        for name in names:
+            if (proof := self.proofs.get(name)) is not None:
+                known = proof.parts[0] if proof.parts and around.refuses else proof
+                yield Lemma(name, known.predicates, known.clauses)
+
+    def _parts(self) -> Iterator[tuple[Timing, tuple[str, ...]]]:
+        named = self._named()
+        yield Timing.ANY, named
+        known: tuple[str, ...] = ()
+        for steps in range(len(self.systems) + 1):
+            names = tuple(self._reached_from(named, steps))
+            if names != known:
+                yield Timing.SCHEDULED, names
+            known = names
+
+    def _named(self) -> tuple[str, ...]:
+        """List the levels whose variables it reads, also those of a party outside, by who is at the other end."""
+        ends = {
+            end: other
+            for wire in self.system.wires
+            for end, other in ((wire.source, wire.target), (wire.target, wire.source))
+        }
+        read = read_by_all(self.stated)
+        found = set()
+        for name in read:
+            party = name.partition(".")[0]
+            if party not in self.systems:
+                party = next(
+                    (
+                        o.partition(".")[0]
+                        for end, o in ends.items()
+                        if name == end or name.startswith(f"{end}.")
+                    ),
+                    "",
+                )
+            found.add(party)
+        return tuple(name for name in self.systems if name in found)
+
+    def _reached_from(self, names: Iterable[str], steps: int) -> Iterator[str]:
+        """Yield these levels and those that write to them, directly or by so many others."""
+        here = set(names)
+        for _ in range(steps):
+            here |= {
+                wire.source.partition(".")[0]
+                for wire in self.system.wires
+                if wire.target.partition(".")[0] in here
+            } & self.systems.keys()
+        yield from (name for name in self.systems if name in here)
+
+    def _together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
+        systems = {
+            name: ts.refusing() if around.refuses else ts.admitting() for name, ts in self.systems.items()
+        }
+        ts = together(systems, names, self.system, self.program, timing, self.stated.name)
+        return replace(ts, restarting=around.restarts)
+
+    # --- runs ---
+
+    def _run(self, around: Surroundings, most: int) -> Ticks:
+        """Look for the shortest run of all levels that breaks it, of so many ticks."""
+        ts = self._together(self.every, Timing.SCHEDULED, around)
+        step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+        made = circuit(ts, firsts, step, obligations(ts, step))
+        for run in looked(made, most).runs.values():
+            return played(ts, made, run, self.stated) or ()
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Lemma:
+    """The invariant of one level: clauses over predicates, confirmed of it alone."""
+
+    level: str
+    predicates: tuple[Predicate, ...]
+    clauses: tuple[Clause, ...]
+
+
+def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -> str | None:
+    """Prove the requirement of levels together; return how, in words, or None.
+
+    Args:
+        ts: The levels.
+        lemmas: What is known of them.
+        exact: Whether exact engines try what no invariant over predicates shows.
+    """
+    step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+    wanted = obligations(ts, step)
+    assert len(wanted) == 1, "nothing would be proved of nothing"
+    owed = [*(obligations(ts, first) for first in firsts), wanted]
+    known = tuple(of_member(one, lemma.level) for lemma in lemmas for one in lemma.predicates)
+    chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
+    held = tuple(_clauses(ts, chosen, lemmas))
+    found, by = _searched((*firsts, step), owed, chosen, held), ""
+    if exact:
+        more = helped(ts, firsts, step, wanted, found)
+        found, by = more.invariant, next(iter(more.by.values()), "")
+    if found.open:
+        return None
+    for integers in (False, True) if by else (False,):
+        with suppress(NotConfirmedError, GaveUpError):
+            confirm_owed(found, firsts, step, owed, LIMITS, known=held, exact=integers)
+            return by
+    return None
+
+
+def _clauses(ts: Together, chosen: Sequence[Predicate], lemmas: Iterable[Lemma]) -> Iterator[Clause]:
+    """Yield the clauses of lemmas over these predicates, which hold in every state in which a later tick begins.
+
+    They hold after each cycle of their level. Where it need not run in the first tick, only those are yielded that hold before its first
+    cycle, too.
+    """
+    places, start = {one.name: at for at, one in enumerate(chosen)}, ts.initial()
+    for lemma in lemmas:
+        own = [places[of_member(one, lemma.level).name] for one in lemma.predicates]
+        for clause in lemma.clauses:
+            placed = tuple(sorted((own[at], value) for at, value in clause))
+            if ts.timing is Timing.SCHEDULED or _holds(chosen, placed, start):
+                yield placed
+
+
+def _holds(chosen: Sequence[Predicate], clause: Clause, state: Leaves) -> bool:
+    """Return whether a state of constants is outside the cube."""
+    for at, value in clause:
+        node = chosen[at].node(state)
+        if node.known and (node.low == value if value >= 0 else node.low != ~value):
+            continue
+        return node.known
+    return False
+
+
+def _searched(
+    cycles: Sequence[Cycle],
+    owed: Sequence[Sequence[Obligation]],
+    chosen: tuple[Predicate, ...],
+    held: tuple[Clause, ...],
+) -> FoundInvariant:
+    """Search an invariant over predicates: of first cycles and a later one, with what each owes, and clauses that are known to hold."""
+    every = range(len(owed[-1]))
+    posed = [
+        Posed(chosen, cycle, {at: each[at].holds for at in every})
+        for cycle, each in zip(cycles, owed, strict=True)
+    ]
+    weights = [2 if one.parts else int(one.size > 2) for one in chosen]
+    try:
+        clauses, left = PDR(posed[:-1], posed[-1], Reached.of(()), weights, held).search(every)
+    except GaveUpError:
+        return FoundInvariant(chosen, held, frozenset(every))
+    finally:
+        for cycle in posed:
+            cycle.sat.close()
+    return FoundInvariant(chosen, tuple(clauses), frozenset(left))

@@ -1,0 +1,77 @@
+"""What the names of a file of requirements across levels mean: the variables of all levels, and of the parties outside that buffers name.
+
+In: a system's description and the programs of its levels. Out: `Parties` for `resolve_across`, and the program of the file.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+
+from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.compose.proof.system import NoProgramError, loaded_program
+from rcsc.lang.model import Program
+from rcsc.lang.project import Loaded, load, systems_above
+from rcsc.lang.resolve.across import Named, Parties, named, part_of, resolve_across
+from rcsc.run.description import BadDescription, Description, description
+
+
+def stated_across(system: Description, programs: Mapping[str, Program]) -> tuple[Program, Loaded] | None:
+    """Return the requirements of a system, and the files that they were read from; None where it names none.
+
+    Raises:
+        NoProgramError: The file is missing, or not in order.
+    """
+    if system.requirements is None:
+        return None
+    loaded = load([os.path.relpath(system.requirements)])
+    program = (
+        resolve_across(loaded.roots[0], loaded, parties(system, programs), system.tick_ms)
+        if loaded.roots
+        else ()
+    )
+    if isinstance(program, Program):
+        return program, loaded
+    raise NoProgramError(
+        f"the file of requirements across levels is not in order: see `rcsc check {os.path.relpath(system.requirements)}`"
+    )
+
+
+def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return what is wrong with a file that no level's program is: as requirements of a system that names it, else what was found.
+
+    Nothing is told of it where the levels of that system are not in order, which is told of their own files.
+    """
+    real = os.path.realpath(root)
+    for path in systems_above(root):
+        try:
+            system = description(path)
+            if system.requirements is None or os.path.realpath(system.requirements) != real:
+                continue
+            programs = {spec.name: loaded_program(path, spec.program)[0] for spec in system.levels}
+        except (BadDescription, NoProgramError):
+            continue
+        found = resolve_across(root, loaded, parties(system, programs), system.tick_ms)
+        return () if isinstance(found, Program) else found
+    return tuple(otherwise)
+
+
+def parties(system: Description, programs: Mapping[str, Program]) -> Parties:
+    """Return what each level has, and each party outside: what it gives to levels, and what it takes of them."""
+    every: dict[str, dict[str, Named]] = {
+        level: {declared.name: named(program, declared) for declared in program.declared}
+        for level, program in programs.items()
+    }
+    for party, one in _outside(system, programs):
+        every.setdefault(party, {}).setdefault(one.name, one)
+    return {party: tuple(variables.values()) for party, variables in every.items()}
+
+
+def _outside(system: Description, programs: Mapping[str, Program]) -> Iterator[tuple[str, Named]]:
+    """Yield each variable of a party outside, of the type that the level at the other end of its buffer has."""
+    for wire in system.wires:
+        for end, other, given in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
+            (party, _, name), (level, _, variable) = end.partition("."), other.partition(".")
+            if party in programs or level not in programs or "." in name:
+                continue
+            declared = part_of(programs[level], variable)
+            if declared is not None:
+                yield party, named(programs[level], declared, name, given=given)

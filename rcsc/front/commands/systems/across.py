@@ -1,0 +1,177 @@
+"""What `rcsc prove` says of requirements across levels: first of all, for they are what the levels are for."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rcsc.base.diagnostics import report
+from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.cache import Cache
+from rcsc.code.testing.figures import counted
+from rcsc.compose.contract.claims import declared
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings
+from rcsc.compose.counterexample.finding import rows
+from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.together.kept import answered
+from rcsc.compose.together.product import Timing
+from rcsc.compose.together.proof import NO_RESTART, Across, Question
+from rcsc.compose.together.repeated import repeated
+from rcsc.compose.together.words import stated_across
+from rcsc.front.commands.shared.proved import named
+from rcsc.front.commands.shared.stopped import attach, say_error
+from rcsc.front.commands.systems.explained import say_run
+from rcsc.lang.project import Loaded
+
+_TIMINGS = {Timing.ANY: "under any timing", Timing.SCHEDULED: "as scheduled"}
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The answers to all requirements across the levels of a system.
+
+    Attributes:
+        file: The file that states them.
+        loaded: The file, and all that it uses.
+        every: The answers, each with its run as the executors repeated it, where there is one.
+    """
+
+    file: str
+    loaded: Loaded
+    every: tuple[tuple[Across, Explanation | None], ...]
+
+
+def answers(
+    systems: Mapping[str, TransitionSystem],
+    whole: SystemProof,
+    settings: TraceSettings,
+    cache: Cache | None,
+) -> Answers | None:
+    """Answer the requirements across levels; None where the system states none.
+
+    Raises:
+        NoProgramError: Their file is not in order.
+        OSError: A run cannot be kept where it should be.
+    """
+    stated = stated_across(settings.system, {name: ts.program for name, ts in systems.items()})
+    if stated is None:
+        return None
+    program, loaded = stated
+    proofs = {proof.level: proof for proof in whole.levels}
+    every = []
+    for one in program.properties:
+        found = answered(Question(systems, settings.system, program, one, proofs), cache)
+        every.append((found, repeated(found, systems, settings) if found.run else None))
+    return Answers(program.file, loaded, tuple(every))
+
+
+def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found: Across) -> str:
+    """Return the verdict in words, with the timing, the levels, what it rests on and what it trusts."""
+    levels = ", ".join(f"`{name}`" for name in found.levels)
+    if not found.proved:
+        if found.refuted:
+            return f"refuted in tick {len(found.run)}, {_TIMINGS[found.timing]}, by a run of {levels}"
+        return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
+    closed = found.closed(systems, whole.closed)
+    where = f"{_TIMINGS[found.timing]}, of {levels}{f', {found.by}' if found.by else ''}"
+    if closed.lacks:
+        return f"rests on {named(whole, '', closed.lacks)}; given that, proved {where}"
+    trusts = [*declared(closed.trusts), *(trust for trust in closed.trusts if trust == NO_RESTART)]
+    return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts)}"
+
+
+def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers) -> Iterator[str]:
+    """Yield a line for each requirement."""
+    yield click.style(f"requirements across levels, {Path(given.file).name}", bold=True)
+    for found, _ in given.every:
+        yield f"  {found.stated.name:24} {standing(systems, whole, found)}"
+
+
+def status(
+    whole: SystemProof, systems: Mapping[str, TransitionSystem], given: Answers, *, strict: bool
+) -> int:
+    """Return the exit status: 1 where one is not proved, and where one rests on what is not, if that is asked for."""
+    every = [found for found, _ in given.every]
+    rests = strict and any(found.vacuous or found.closed(systems, whole.closed).lacks for found in every)
+    return 1 if rests or not all(found.proved for found in every) else 0
+
+
+def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
+    """Print the run of each requirement that some run breaks, also where it is proved of kinder surroundings."""
+    for found, explanation in given.every:
+        if found.vacuous:
+            say_error(
+                Code.VACUOUS,
+                f"requirement `{found.stated.name}` across levels is vacuous: nothing ever asks",
+                "warning",
+            )
+        if explanation is None:
+            if not found.proved:
+                say_error(Code.NOT_COMPOSED, f"requirement `{found.stated.name}` across levels: not proved")
+                attach("note", f"it says: {found.stated.text}")
+                attach("note", f"no run of {counted(found.looked, 'tick')} breaks it; a longer one may")
+                attach(
+                    "help", "a requirement, or an invariant of a level, that says why it holds may show it"
+                )
+            continue
+        if found.proved:
+            say_error(
+                Code.NOT_COMPOSED,
+                f"requirement `{found.stated.name}` across levels is proved of kinder surroundings only: this run breaks it",
+                "warning",
+            )
+        else:
+            say_error(Code.NOT_COMPOSED, f"requirement `{found.stated.name}` across levels: refuted")
+        attach("note", f"it says: {found.stated.text}")
+        say_run(systems, explanation)
+
+
+def as_json(
+    systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers | None
+) -> list[dict[str, Any]]:
+    """Return each requirement with its verdict, what it rests on and trusts, and its run."""
+    return [] if given is None else [_one(systems, whole, *each) for each in given.every]
+
+
+def _one(
+    systems: Mapping[str, TransitionSystem],
+    whole: SystemProof,
+    found: Across,
+    explanation: Explanation | None,
+) -> dict[str, Any]:
+    closed = found.closed(systems, whole.closed)
+    verdict = (
+        "proved"
+        if closed.proved
+        else "conditional"
+        if found.proved
+        else "refuted"
+        if found.refuted
+        else "open"
+    )
+    finding = None if explanation is None else explanation.finding
+    return {
+        "name": found.stated.name,
+        "says": found.stated.text,
+        "requirements": list(found.stated.requirements),
+        "verdict": verdict,
+        "timing": found.timing.value,
+        "levels": list(found.levels),
+        "rests_on": [named(whole, "", [need]) for need in closed.lacks],
+        "trusts": list(closed.trusts),
+        "vacuous": found.vacuous,
+        "looked": found.looked,
+        "time_line": [] if finding is None else [asdict(row) for row in rows(systems, finding)],
+        "beside": [] if explanation is None else list(explanation.beside),
+        "log": "" if explanation is None or explanation.log is None else str(explanation.log),
+    }
+
+
+def beside(given: Answers | None) -> Sequence[str]:
+    """Return where executors differ from the interpreter: a fault of rcsc's own."""
+    return (
+        [] if given is None else [line for _, each in given.every if each is not None for line in each.beside]
+    )

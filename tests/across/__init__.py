@@ -1,0 +1,1 @@
+"""Requirements across levels. The judge runs the levels' own executors under `rcsc.run`, in every state and with all that may come."""

@@ -1,0 +1,255 @@
+"""Systems of two and three small levels drawn at random, and the same systems as they run, for every state that they reach.
+
+In: a seed. Out: files; of a requirement the shortest run that breaks it, or none. The judge steps `run.system.System` on Python executors,
+restarts levels as `run.adopt` does, publishes what stands outside, and steps monitors by themselves: it shares nothing with the product.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from rcsc.compose.counterexample.rerun import make
+from rcsc.compose.proof.system import read_systems
+from rcsc.compose.together.words import stated_across
+from rcsc.lang.model import Program, Property, earlier
+from rcsc.lang.over_time.run import Watch
+from rcsc.run.buffers import CommonMemory
+from rcsc.run.description import Description, description
+from rcsc.run.levels import StateTableError, running_level
+from rcsc.run.system import System, executors, signatures
+
+MOST_TICKS = 6_000
+"""Ticks that are run for one requirement: what is longer stays open."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A drawn system; `periods`, in ticks of 10 ms."""
+
+    levels: tuple[str, ...]
+    files: Mapping[str, str]
+
+
+def drawn(seed: int) -> Drawn:
+    """Draw a system whose levels are `a`, `b` and perhaps `c`, each with inputs `x` and `y`, a state `n` and an output `o`."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    names = tuple("abc"[: random.choice((2, 2, 3))])
+    files = {"rcsc.toml": 'name = "drawn"\n'}
+    wires = list[str]()
+    for name in names:
+        files[f"{name}.rcs"] = _level(random, name)
+        others = [other for other in names if other != name]
+        wires.append(f'"{random.choice(others)}.o" = "{name}.x"')
+    wires = list({wire.partition(" ")[0]: wire for wire in wires}.values())  # an output feeds one input here
+    for name in names:
+        wires.append(f'"plant.y_{name}" = "{name}.y"')
+    tick = 'name = "drawn"\ngenerated = "generated"\ntick_ms = 10\nrequirements = "requirements.rcs"\n'
+    levels = "".join(f'[[level]]\nname = "{name}"\n' for name in names)
+    files["system.toml"] = tick + levels + "[buffers]\n" + "\n".join(wires) + "\n"
+    files["requirements.rcs"] = "\n".join(_requirements(random, names)) + "\n"
+    return Drawn(names, files)
+
+
+def _level(random: Random, name: str) -> str:
+    kind = random.choice(("bool", "int 0 .. 2"))
+    rows = [
+        f"  | r{at} | {x} | {y} | {n} || {random.choice(('n', '0', '1', '2', n))} | {random.choice(('true', 'false'))} |"
+        for at, (x, y, n) in enumerate(product(("true", "false"), ("true", "false"), "012"))
+    ]
+    over = "y" if kind == "bool" else "y > 0"
+    restart = random.choice(("", " restart 2"))
+    return "\n".join(
+        [
+            "input x : bool",
+            f"input y : {kind}",
+            f"state n : int 0 .. 2{restart}",
+            f"output o : bool safe {random.choice(('true', 'false'))}",
+            f"table of_{name} {{",
+            f"  | line | x | {over} | n || n | o |",
+            "  |------|---|---|---||---|---|",
+            *(row.replace("| n |", "| n |") for row in rows),
+            "}",
+            f"level {name} {{ period {random.choice((10, 10, 20, 30))} [ms] table of_{name} }}",
+        ]
+    )
+
+
+def _requirements(random: Random, names: tuple[str, ...]) -> Iterator[str]:
+    def atom() -> str:
+        name = random.choice(names)
+        party = f"plant.y_{name}"
+        return random.choice(
+            (f"{name}.o", f"{name}.n = {random.randrange(3)}", f"{name}.x", f"{name}.n > {random.randrange(2)}", f"not {name}.o",
+             f"was {name}.o", f"({party} = {party})")
+        )  # fmt: skip
+
+    for at in range(4):
+        p, q, r = atom(), atom(), atom()
+        cycles = random.randrange(1, 4)
+        said = random.choice(
+            (f"always ({p} implies {q})", f"always ({p} or {q} or {r})", f"never ({p} and {q} and {r})",
+             f"when {p}, within {cycles} cycles, {q}",
+             f"whenever {p} and {q}, next ({r})", f"when {p}, for {cycles} cycles, {q}", f"after {p}, always ({q} or {r})",
+             f"always ({p} implies once ({q}))", f"while {p}, when {q}, within {cycles} cycles, {r}", f"only after {p}, {q}")
+        )  # fmt: skip
+        yield f"requirement r{at} : {said}"
+
+
+# --- as it runs --------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Running:
+    """A drawn system on Python executors."""
+
+    path: Path
+    system: System = field(init=False)
+    described: Description = field(init=False)
+    program: Program = field(init=False)
+    inputs: dict[str, tuple[Any, ...]] = field(init=False)
+    begins: tuple[Any, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        systems, _ = read_systems(self.path)
+        programs = {name: ts.program for name, ts in systems.items()}
+        self.described = description(self.path)
+        make(programs.values(), self.described.generated, altered=False)
+        signs = signatures(self.described)
+        by_level = executors(self.described, signs, "python")
+        levels = tuple(
+            running_level(spec, self.described, signs[spec.name], by_level[spec.name], {})
+            for spec in self.described.levels
+        )
+        self.system = System(self.described, levels, (), CommonMemory())
+        stated = stated_across(self.described, programs)
+        assert stated is not None
+        self.program = stated[0]
+        self.inputs = {
+            name: (False, True) if "bool" in str(ts.kinds["y"]).lower() else (0, 1, 2, 3)  # 3 is refused
+            for name, ts in systems.items()
+        }
+        values = tuple(level.values for level in levels)
+        self.begins = values, {}, {level.name: self._inputs(level.name) for level in levels}, {}, 0
+
+    def shortest(self, stated: Property, most: int, *, refuses: bool, restarts: bool) -> int | None:
+        """Return the number of ticks of the shortest run that breaks a requirement; 0 if none does, None if that is not known.
+
+        Args:
+            stated: The requirement.
+            most: No longer run is looked for.
+            refuses: Whether inputs may be refused; `restarts`, whether levels may begin anew.
+            restarts: Whether levels may begin anew.
+        """
+        names = [level.name for level in self.system.levels]
+        watch = Watch(stated) if stated.monitor is not None else None
+        values, held, admitted, _, tick = self.begins
+        begins = (None, (values, held, admitted, {} if watch is None else dict(watch.state), tick))
+        seen, here, ran = {begins[0]}, [begins], 0
+        given = list(product(*(self._given(name, refuses=refuses) for name in names)))
+        again = list(product((False, True), repeat=len(names))) if restarts else [(False,) * len(names)]
+        for tick in range(most):
+            after = []
+            for _, kept in here:
+                for values, anew in product(given, again if tick else again[:1]):
+                    due = [
+                        self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels
+                    ]
+                    if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
+                        continue  # it begins anew before a cycle of it
+                    ran += 1
+                    if ran > MOST_TICKS:
+                        return None
+                    found = self._step(
+                        kept,
+                        dict(zip(names, values, strict=True)),
+                        dict(zip(names, anew, strict=True)),
+                        watch,
+                        stated,
+                    )
+                    if found is None:
+                        return tick + 1
+                    if found[0] not in seen:
+                        seen.add(found[0])
+                        after.append(found)
+            if not after:
+                return 0
+            here = after
+        return None
+
+    def _given(self, name: str, *, refuses: bool) -> tuple[Any, ...]:
+        return tuple(value for value in self.inputs[name] if refuses or value != 3)
+
+    def _inputs(self, name: str) -> tuple[Any, ...]:
+        level = self.system.level(name)
+        return level.value("x"), level.value("y")
+
+    def _state(self, admitted: dict[str, tuple[Any, ...]], watch: Watch | None, tick: int) -> tuple[Any, Any]:
+        values = tuple(level.values for level in self.system.levels)
+        held = dict(self.system.buffers._held)  # type: ignore[attr-defined]  # a copy
+        states = {} if watch is None else dict(watch.state)
+        key = (
+            values,
+            tuple(sorted(held.items())),
+            tuple(sorted(admitted.items())),
+            tuple(states.items()),
+            tick % 6,
+        )
+        return key, (values, held, dict(admitted), states, tick)
+
+    def _at(self, kept: Any) -> System:
+        values, held, _, _, tick = kept
+        for level, of in zip(self.system.levels, values, strict=True):
+            level.put_back(of)
+        self.system.buffers._held = dict(held)  # type: ignore[attr-defined]  # as it was
+        self.system.tick = tick
+        return self.system
+
+    def _seen(self, admitted: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+        seen = dict[str, Any]()
+        for level in self.system.levels:
+            x, y = admitted[level.name]
+            of = {"x": x, "y": y, "n": level.value("n"), "o": level.value("o")}
+            seen |= {f"{level.name}.{leaf}": value for leaf, value in of.items()}
+            seen[f"plant.y_{level.name}"] = y
+        return seen
+
+    def _step(
+        self, kept: Any, given: dict[str, Any], anew: dict[str, bool], watch: Watch | None, stated: Property
+    ) -> tuple[Any, Any] | None:
+        system, (_, _, admitted, states, tick) = self._at(kept), kept
+        before = self._seen(admitted)
+        for name, value in given.items():
+            system.buffers.publish(f"plant.y_{name}", (value,))
+        for name, begins in anew.items():
+            if begins:
+                system.restart(name)
+        with suppress(StateTableError):  # a level was refused an input
+            system.step()
+        system.tick = tick + 1
+        now = dict(admitted)
+        for level in system.levels:
+            if tick * 10 % level.level.period_ms == 0 and not level.fault:
+                now[level.name] = self._inputs(level.name)
+        after = self._seen(now)
+        if watch is not None:
+            watch.state = dict(states)
+            if not watch.keeps(before, after):
+                return None
+        else:
+            from rcsc.lang.interpret import holds
+
+            looked = {str(earlier(name)): value for name, value in before.items()}
+            if not holds(stated.condition, {**after, **looked}):
+                return None
+        return self._state(now, watch, tick + 1)
+
+
+def written(made: Drawn, folder: Path) -> Path:
+    """Write the files of a system; return its description."""
+    for name, text in made.files.items():
+        (folder / name).write_text(text)
+    return folder / "system.toml"

@@ -1,0 +1,323 @@
+"""Requirements across levels: what their names mean, how they are answered, and how `rcsc check` and `rcsc prove` tell of them."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+from rcsc.compose.counterexample.explain import TraceSettings
+from rcsc.compose.proof.system import prove_transition_systems, read_systems
+from rcsc.compose.together.product import Timing
+from rcsc.compose.together.proof import NO_RESTART, Across, Question
+from rcsc.compose.together.repeated import repeated
+from rcsc.compose.together.words import stated_across
+from rcsc.front.commands import run
+from rcsc.run.description import description
+
+Ran = tuple[int, str, str]
+Rcsc = Callable[..., Ran]
+
+
+@pytest.fixture
+def rcsc(capfd: pytest.CaptureFixture[str]) -> Rcsc:
+    def run_it(*args: object) -> Ran:
+        capfd.readouterr()
+        status = run(list(map(str, args)))
+        shown = capfd.readouterr()
+        return status, shown.out, shown.err
+
+    return run_it
+
+
+_BOSS = """\
+enum side { nobody, l, r }
+input wish : side
+input left_runs : bool
+input right_runs : bool
+output go_left : bool safe false
+output go_right : bool safe false
+table choose {
+  | line  | wish   | left_runs | right_runs || go_left | go_right |
+  |-------|--------|-----------|------------||---------|----------|
+  | none  | nobody |           |            || false   | false    |
+  | l     | l      |           | false      || true    | false    |
+  | not_l | l      |           | true       || false   | false    |
+  | r     | r      | false     |            || false   | true     |
+  | not_r | r      | true      |            || false   | false    |
+}
+level boss { period 10 [ms] table choose }
+"""
+_HAND = """\
+input go : bool
+output runs : bool safe false
+table move_NAME {{
+  | line | go    || runs  |
+  |------|-------||-------|
+  | on   | true  || true  |
+  | off  | false || false |
+}}
+level NAME {{ period PERIOD [ms] table move_NAME }}
+""".replace("{{", "{").replace("}}", "}")
+_SYSTEM = """\
+name = "two"
+generated = "generated"
+tick_ms = 10
+requirements = "all.rcs"
+[[level]]
+name = "boss"
+[[level]]
+name = "left"
+[[level]]
+name = "right"
+[buffers]
+"boss.go_left" = "LEFT.go"
+"boss.go_right" = "RIGHT.go"
+"left.runs" = "boss.left_runs"
+"right.runs" = "boss.right_runs"
+"panel.wish" = "boss.wish"
+"""
+
+
+def _written(
+    folder: Path, requirements: str, *, crossed: bool = False, period: int = 10, files: Mapping[str, str] = {}
+) -> Path:
+    left, right = ("right", "left") if crossed else ("left", "right")
+    texts = {
+        "rcsc.toml": 'name = "two"\n',
+        "system.toml": _SYSTEM.replace("LEFT", left).replace("RIGHT", right),
+        "all.rcs": requirements,
+        "boss.rcs": _BOSS,
+        **{f"{name}.rcs": _HAND.replace("NAME", name).replace("PERIOD", str(period)) for name in ("left", "right")},
+        **files,
+    }  # fmt: skip
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    return folder / "system.toml"
+
+
+def _answers(path: Path) -> dict[str, Across]:
+    systems, _ = read_systems(path)
+    whole = prove_transition_systems(systems, None, 1, tuple(systems))
+    proofs = {proof.level: proof for proof in whole.levels}
+    system = description(path)
+    stated = stated_across(system, {name: ts.program for name, ts in systems.items()})
+    assert stated is not None
+    return {
+        one.name: Question(systems, system, stated[0], one, proofs).answer() for one in stated[0].properties
+    }
+
+
+_BOTH = "requirement never_both : always not (left.runs and right.runs)\n"
+_SOON = "requirement soon : when boss.wish = l and not right.runs, within 2 cycles, left.runs\n"
+
+
+def test_what_no_level_keeps_alone_is_proved_of_all_as_they_are_scheduled(tmp_path: Path) -> None:
+    found = _answers(_written(tmp_path, _BOTH))["never_both"]
+    assert (found.proved, found.timing, found.levels) == (
+        True,
+        Timing.SCHEDULED,
+        ("boss", "left", "right"),
+    )
+    assert found.around.refuses
+    assert found.around.restarts
+
+
+def test_what_one_level_keeps_holds_under_any_timing(tmp_path: Path) -> None:
+    found = _answers(_written(tmp_path, "property one : not (boss.go_left and boss.go_right)\n"))["one"]
+    assert (found.proved, found.timing, found.levels) == (True, Timing.ANY, ("boss",))
+
+
+def test_what_a_run_breaks_is_shown_by_the_shortest_one_and_the_executors_repeat_it(
+    tmp_path: Path, rcsc: Rcsc
+) -> None:
+    path = _written(tmp_path, _SOON)
+    found = _answers(path)["soon"]
+    assert (found.refuted, len(found.run), found.levels) == (True, 5, ("boss", "left", "right"))
+    systems, _ = read_systems(path)
+    shown = repeated(found, systems, TraceSettings(description(path), 8, log=tmp_path / "logs"))
+    assert not shown.beside
+    assert shown.in_c
+    assert shown.log is not None
+    for executor in ("c", "python"):
+        made = tmp_path / "logs" / "generated"
+        status, out, _ = rcsc(
+            "replay", shown.log, "--system", path, "--generated", made, "--executor", executor
+        )
+        assert status == 0, out
+
+
+def test_a_wire_that_is_crossed_is_found(tmp_path: Path) -> None:
+    answered = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
+    assert _answers(_written(tmp_path, answered))["obeys"].proved
+    assert _answers(_written(tmp_path, answered, crossed=True))["obeys"].refuted
+
+
+def test_a_level_of_a_longer_period_reacts_later(tmp_path: Path) -> None:
+    late = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
+    later = late.replace("within 1", "within 2")
+    every = _answers(_written(tmp_path, late + later.replace("obeys", "obeys_later"), period=20))
+    assert every["obeys"].refuted
+    assert every["obeys_later"].proved
+
+
+_COUNTS = """\
+input go : bool
+output runs : bool safe false
+state n : int 0 .. 3
+table move_left {
+  | line | go    | n   || n     | runs  |
+  |------|-------|-----||-------|-------|
+  | on   | true  | < 3 || n + 1 | true  |
+  | most | true  | 3   || 3     | true  |
+  | off  | false |     || n     | false |
+}
+level left { period 10 [ms] table move_left }
+"""
+
+
+def test_what_only_a_restart_breaks_is_proved_trusting_that_none_comes(tmp_path: Path) -> None:
+    counted = "property never_back : left.n >= was left.n\n"
+    found = _answers(_written(tmp_path, counted, files={"left.rcs": _COUNTS}))["never_back"]
+    assert found.proved
+    assert not found.around.restarts
+    assert found.run
+    assert any(step.anew for tick in found.run for step in tick.values())
+    assert found.around.refuses
+    assert found.trusts({}) == (NO_RESTART,)
+
+
+_DOUBTS = """\
+input go : bool
+input load : int 0 .. 10
+output runs : bool safe false
+table move_left {
+  | line | go    | load || runs  |
+  |------|-------|------||-------|
+  | on   | true  | < 8  || true  |
+  | too  | true  | >= 8 || false |
+  | off  | false |      || false |
+}
+level left { period 10 [ms] table move_left }
+"""
+
+
+def test_what_only_a_refusal_breaks_is_proved_trusting_that_none_comes(tmp_path: Path) -> None:
+    obeys = "requirement obeys : whenever boss.go_left, next left.runs or left.load >= 8\n"
+    found = _answers(_written(tmp_path, obeys, files={"left.rcs": _DOUBTS}))["obeys"]
+    assert found.proved
+    assert not found.around.refuses
+    assert any(step.fault.name == "ADMIT" for tick in found.run for step in tick.values())
+
+
+def test_what_is_assumed_of_a_party_over_time_is_kept_by_every_run(tmp_path: Path) -> None:
+    calm = "assume calm assumed : never panel.wish = r\n"
+    never = "requirement never_right : never right.runs\n"
+    assert _answers(_written(tmp_path, calm + never))["never_right"].proved
+    assert _answers(_written(tmp_path, never))["never_right"].refuted
+
+
+def test_what_nothing_ever_asks_for_is_told(tmp_path: Path, rcsc: Rcsc) -> None:
+    never = "requirement idle : when boss.go_left and boss.go_right, within 1 cycles, left.runs\n"
+    path = _written(tmp_path, never)
+    assert _answers(path)["idle"].vacuous
+    status, out, err = rcsc("prove", path, "--no-cache")
+    assert (status, rcsc("prove", path, "--no-cache", "--strict")[0]) == (0, 1)
+    assert "vacuous, proved" in out
+    assert "RCS760" in err
+
+
+def test_the_examples_of_the_manual_are_as_it_says(tmp_path: Path) -> None:
+    manual = (Path(__file__).parents[2] / "grammar" / "requirements.md").read_text()
+    text = manual.partition("```across\n")[2].partition("```")[0]
+    said = {line.split()[1]: line.partition("#")[2].strip() for line in text.splitlines()}
+    found = _answers(_written(tmp_path, text))
+    assert {name: _said(one) for name, one in found.items()} == said
+
+
+def _said(found: Across) -> str:
+    if found.vacuous:
+        return "vacuous"
+    if found.proved:
+        return "proved under any timing" if found.timing is Timing.ANY else "proved as scheduled"
+    return f"refuted in tick {len(found.run)}"
+
+
+# --- words -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "said"),
+    [
+        (
+            "state x : bool\nrequirement p : always left.runs\n",
+            "RCS325",
+            "states requirements and properties",
+        ),
+        ("requirement p : always lft.runs\n", "RCS201", "did you mean `left`?"),
+        ("requirement p : always left.run\n", "RCS201", "did you mean `runs`?"),
+        ("requirement p : always boss.wish = 3\n", "RCS301", "which is `side`"),
+        ("requirement p : always panel.wisch = l\n", "RCS201", "did you mean `wish`?"),
+        ("requirement p : when left.runs, eventually right.runs\n", "RCS325", "say until when"),
+        ("requirement p : when left.runs, within 15 [ms], right.runs\n", "RCS317", "10 ms"),
+    ],
+)
+def test_what_is_wrong_in_the_file_is_told_in_it(
+    tmp_path: Path, rcsc: Rcsc, text: str, code: str, said: str
+) -> None:
+    _written(tmp_path, text)
+    status, out, _ = rcsc("check", tmp_path / "all.rcs", "--no-cache")
+    assert status == 1
+    assert code in out
+    assert said in out
+
+
+def test_a_folder_with_such_a_file_is_in_order(tmp_path: Path, rcsc: Rcsc) -> None:
+    _written(tmp_path, _BOTH + _SOON)
+    status, out, _ = rcsc("check", tmp_path, "--no-cache")
+    assert status == 0, out
+
+
+def test_constants_of_a_used_file_and_names_of_a_party_outside_can_be_read(tmp_path: Path) -> None:
+    words = "const most = 2\nconst unused = 3\n"
+    text = "use words\nproperty p : panel.wish = nobody or most = 2\n"
+    assert _answers(_written(tmp_path, text, files={"words.rcs": words}))["p"].proved
+
+
+# --- `rcsc prove` ------------------------------------------------------------------------------
+
+
+def test_prove_tells_requirements_first_with_timing_levels_and_runs(tmp_path: Path, rcsc: Rcsc) -> None:
+    path = _written(tmp_path, _BOTH + _SOON)
+    status, out, err = rcsc("prove", path, "--no-cache")
+    assert status == 1
+    first = out.splitlines()
+    assert first[0] == "requirements across levels, all.rcs"
+    assert "proved as scheduled, of `boss`, `left`, `right`" in first[1]
+    assert "refuted in tick 5" in first[2]
+    assert "requirement `soon` is broken" in err
+    _, out, _ = rcsc("prove", path, "--no-cache", "--json")
+    every = {one["name"]: one for one in json.loads(out)["requirements"]}
+    assert (every["never_both"]["verdict"], every["soon"]["verdict"]) == ("proved", "refuted")
+    assert len({row["tick"] for row in every["soon"]["time_line"]}) == 5
+
+
+def test_a_proof_is_kept_and_a_changed_requirement_is_asked_anew(tmp_path: Path, rcsc: Rcsc) -> None:
+    path = _written(tmp_path, _BOTH)
+    for _ in range(2):
+        status, out, _ = rcsc("prove", path)
+        assert status == 0
+        assert "never_both" in out
+    (tmp_path / "all.rcs").write_text(_BOTH.replace("always not", "always"))
+    status, out, _ = rcsc("prove", path)
+    assert status == 1
+    assert "refuted in tick 1" in out
+
+
+def test_what_rests_on_a_level_that_is_not_proved_says_so(tmp_path: Path, rcsc: Rcsc) -> None:
+    gap = _HAND.replace("NAME", "left").replace("PERIOD", "10").replace("  | off  | false || false |\n", "")
+    other = "requirement other : always left.runs or not (boss.go_left and boss.go_right)\n"
+    path = _written(tmp_path, other, files={"left.rcs": gap})
+    status, out, _ = rcsc("prove", path, "--no-cache")
+    assert status == 1
+    assert "rests on" in out.splitlines()[1]

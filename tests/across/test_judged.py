@@ -1,0 +1,55 @@
+"""Drawn systems: what is proved of them no run breaks, what is refuted one does, and the shortest is shown."""
+
+from pathlib import Path
+
+import pytest
+
+from rcsc.compose.proof.system import prove_transition_systems, read_systems
+from rcsc.compose.together.proof import Question
+from tests.across.systems import Running, drawn, written
+
+FEW, MOST = 4, 60
+
+
+def judged(seed: int, folder: Path) -> list[str]:
+    """Judge the requirements of a drawn system; return the verdicts."""
+    path = written(drawn(seed), folder)
+    systems, _ = read_systems(path)
+    whole = prove_transition_systems(systems, None, 1, tuple(systems))
+    proofs = {proof.level: proof for proof in whole.levels}
+    running, verdicts = Running(path), []
+    for stated in running.program.properties:
+        for known in ({}, proofs):  # without what is known of each level, and with it
+            found = Question(systems, running.described, running.program, stated, known).answer()
+            if found.proved:
+                around = found.around
+                shortest = running.shortest(stated, 12, refuses=around.refuses, restarts=around.restarts)
+                assert not shortest, (seed, stated.text, found.timing, around, shortest)
+                verdicts.append("proved")
+            if found.run:
+                assert found.broken_in is not None
+                around = found.broken_in
+                shortest = running.shortest(
+                    stated, len(found.run), refuses=around.refuses, restarts=around.restarts
+                )
+                assert shortest in (len(found.run), None), (seed, stated.text, len(found.run), shortest)
+                verdicts.append("refuted")
+            if not found.proved and not found.run:
+                verdicts.append("open")
+    return verdicts
+
+
+@pytest.mark.parametrize("seed", range(FEW))
+def test_drawn_systems_are_judged_as_they_run(seed: int, tmp_path: Path) -> None:
+    assert judged(seed, tmp_path)
+
+
+@pytest.mark.thorough
+def test_many_drawn_systems_are_judged_as_they_run(tmp_path: Path) -> None:
+    verdicts = []
+    for seed in range(1000, 1000 + MOST):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        verdicts += judged(seed, folder)
+    assert {"proved", "refuted"} <= set(verdicts)
+    assert verdicts.count("open") * 10 < len(verdicts)
