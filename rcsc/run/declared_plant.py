@@ -132,7 +132,13 @@ def _check_ends(document: Document, table: Mapping[str, Any], place: KeyPath) ->
     """Check that sensors and actuators are bound to ends that a buffer could have."""
     buffers = document.value.get("buffers")
     for key, side in (("sensors", 0), ("actuators", 1)):
-        ends = [pair[side] for pair in buffers.items()] if isinstance(buffers, dict) else []
+        rows = buffers.items() if isinstance(buffers, dict) else ()
+        pairs = [
+            (source, target)
+            for source, said in rows
+            for target in (said if isinstance(said, list) else (said,))
+        ]
+        ends = [pair[side] for pair in pairs]
         bound = table.get(key, {})
         for end in bound if isinstance(bound, dict) else ():
             if not is_member(end) or not any(

@@ -4,7 +4,7 @@ In: `system.toml`. Out: a frozen `Description`. The names of buffers and of thei
 rest is automatic (Haynes et al. 1984, section 9).
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -16,6 +16,7 @@ from rcsc.base.host.described import (
     Anything,
     BadFile,
     Document,
+    Either,
     Entries,
     FileName,
     KeyPath,
@@ -51,7 +52,7 @@ SYSTEM = Record(
         "level": Listing(LEVEL, least=1),
     },
     {
-        "buffers": Entries(Member()),
+        "buffers": Entries(Either((Member(), Listing(Member(), least=1)))),
         "data": Text(),
         "data_python": Text(),
         "displays": Entries(Listing(Member())),
@@ -94,7 +95,7 @@ class LevelSpec:
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """A buffer: whose output it is, and whose input; `level.variable` at both ends."""
+    """A buffer and one of its readers: whose output it is, and whose input; `level.variable` at both ends."""
 
     source: str
     target: str
@@ -145,6 +146,14 @@ class Description:
         """Return the buffers that a level takes, in order."""
         return tuple(wire.source for wire in self.wires if wire.target.partition(".")[0] == level)
 
+    def readers(self) -> dict[str, tuple[str, ...]]:
+        """Return the inputs that each buffer fills, `level.variable`, by the buffer's name; buffers in the description's order."""
+        return readers(self.wires)
+
+    def place_of(self, wire: Wire) -> KeyPath:
+        """Return where the description says that a buffer goes to a reader; where several read it, the reader's element of the list."""
+        return "buffers", wire.source, self.readers()[wire.source].index(wire.target)
+
     def review(self) -> Document:
         """Return a fresh page for errors, with the places of this description."""
         if self.document is None:
@@ -163,9 +172,10 @@ def description(path: Path) -> Description:
     if document.holds(PARTIES):
         roots = {level["name"]: _root(path, level) for level in document.value["level"]}
         roles = {name: neighbours(root) for name, root in roots.items() if root is not None}
-        buffers = _Rows(document, roles).all()
-        document = replace(document, value={**document.value, "buffers": buffers})
-        _check_parties(document)
+        wires = tuple(_Rows(document, roles).all())
+        _check_parties(document, wires)
+    else:
+        wires = ()
     generated, data = (_place(path, document, key) for key in ("generated", "data"))
     script, requirements = (
         _place(path, document, key) if isinstance(document.value.get(key), str) else None
@@ -174,7 +184,7 @@ def description(path: Path) -> Description:
     declared = plants(path, document)
     if document.faults:
         raise document.bad(BadDescription)
-    whole = _described(path, document, generated, data)
+    whole = _described(path, document, generated, data, wires)
     return replace(whole, plants=declared, script=script, requirements=requirements)
 
 
@@ -195,7 +205,9 @@ def _place(path: Path, document: Document, key: str) -> Path:
         return path
 
 
-def _described(path: Path, document: Document, generated: Path, data: Path) -> Description:
+def _described(
+    path: Path, document: Document, generated: Path, data: Path, wires: tuple[Wire, ...]
+) -> Description:
     content: dict[str, Any] = document.value
     return Description(
         content["name"],
@@ -203,7 +215,7 @@ def _described(path: Path, document: Document, generated: Path, data: Path) -> D
         data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
         content["tick_ms"],
         tuple(level_of(CheckedFields(level)) for level in content["level"]),
-        tuple(Wire(a, b) for a, b in content["buffers"].items()),
+        wires,
         {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
         within=content.get("campaign", {}).get("within", WITHIN),
@@ -253,14 +265,14 @@ def needs_data(system: Description) -> None:
         raise page.bad(BadDescription)
 
 
-def _check_parties(document: Document) -> None:
+def _check_parties(document: Document, wires: Sequence[Wire]) -> None:
     """Check that levels have names of their own, and buffers a level at an end and known parties."""
     content = document.value
     levels = [str(level["name"]) for level in content["level"]]
     for at, name in enumerate(levels):
         if name in levels[:at]:
             document.wrong(("level", at, "name"), f"there are two levels `{name}`")
-    ends = list(_ends(content["buffers"]))
+    ends = list(_ends(wires))
     for path, end, _ in ends:
         party, dot, variable = end.partition(".")
         if not (party and dot and variable) or not is_member(end):
@@ -282,17 +294,55 @@ def _check_parties(document: Document) -> None:
             )  # fmt: skip
         elif theirs not in levels:
             document.wrong(path, f"neither end of `{end}` and `{other}` is a level", *nearest(party, levels))
-    targets = [target for _, target, _ in ends[1::2]]
-    for (path, target, _), at in zip(ends[1::2], range(len(targets)), strict=True):
-        if target in targets[:at]:
-            document.wrong(path, f"`{target}` is filled twice")
+    _check_readers(document, wires, levels)
 
 
-def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
+def _check_readers(document: Document, wires: Sequence[Wire], levels: Sequence[str]) -> None:
+    """Check that every input is filled once, and that a level reads a buffer once."""
+    came: dict[str, str] = {}
+    for path, wire in _placed(wires):
+        if wire.target in came:
+            same = came[wire.target] == wire.source
+            message = f"`{wire.target}` is {'named' if same else 'filled'} twice"
+            helps = (
+                ("leave it out here",)
+                if same
+                else (f"`{came[wire.target]}` fills it, too: an input has one buffer",)
+            )
+            document.wrong(path, message, *helps)
+        came.setdefault(wire.target, wire.source)
+    for source, targets in readers(wires).items():
+        for at, target in enumerate(targets):
+            level = target.partition(".")[0]
+            first = next(other for other in targets if other.partition(".")[0] == level)
+            if level in levels and first != target:
+                document.wrong(
+                    ("buffers", source, at), f"level `{level}` would read `{source}` twice, in `{first}` and in `{target}`",
+                    f"let its lines read `{first}` in both places",
+                )  # fmt: skip
+
+
+def readers(wires: Iterable[Wire]) -> dict[str, tuple[str, ...]]:
+    """Return the inputs that each buffer fills, by the buffer's name."""
+    found: dict[str, tuple[str, ...]] = {}
+    for wire in wires:
+        found[wire.source] = (*found.get(wire.source, ()), wire.target)
+    return found
+
+
+def _placed(wires: Iterable[Wire]) -> Iterator[tuple[KeyPath, Wire]]:
+    """Yield each buffer and reader with its place: the element of a list, or the row."""
+    counts: dict[str, int] = {}
+    for wire in wires:
+        at = counts[wire.source] = counts.get(wire.source, -1) + 1
+        yield ("buffers", wire.source, at), wire
+
+
+def _ends(wires: Iterable[Wire]) -> Iterator[tuple[KeyPath, str, str]]:
     """Yield both ends of each buffer: its place, the end, the other end."""
-    for source, target in buffers.items():
-        yield ("buffers", source), source, target
-        yield ("buffers", source), target, source
+    for path, wire in _placed(wires):
+        yield path, wire.source, wire.target
+        yield path, wire.target, wire.source
 
 
 def _alike(party: str, levels: list[str], parties: list[str]) -> str:
@@ -306,6 +356,15 @@ def _alike(party: str, levels: list[str], parties: list[str]) -> str:
 def places(path: Path, program: str) -> tuple[Path, Path]:
     """Return the paths where a level's program is looked for, in order."""
     return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"
+
+
+def of_a_link(source: str, targets: Sequence[str], level: str, peer: str) -> tuple[str, str]:
+    """Return what is wrong, and a help, where several would read what a level and its neighbour say to each other."""
+    shown = ", ".join(f"`{target}`" for target in targets)
+    return (
+        f"`{source}` is one end of what `{level}` and `{peer}` say to each other, and would be read by several: {shown}",
+        "orders and reports are echoed by the one reader that they are for: give the others an output of its own that they read",
+    )
 
 
 # --- buffers that nobody writes ---
@@ -330,14 +389,18 @@ class _Rows:
     document: Document
     roles: dict[str, Neighbours]
     rows: dict[str, str] = field(default_factory=dict)
+    written: Mapping[str, tuple[str, ...]] = field(init=False)
+    by_target: Mapping[str, str] = field(init=False)
 
-    @property
-    def written(self) -> dict[str, str]:
-        """The rows of the description."""
-        rows: dict[str, str] = self.document.value.get("buffers", {})
-        return rows
+    def __post_init__(self) -> None:
+        """Read the rows of the description."""
+        rows: dict[str, str | list[str]] = self.document.value.get("buffers", {})
+        self.written = {
+            source: (said,) if isinstance(said, str) else tuple(said) for source, said in rows.items()
+        }
+        self.by_target = {target: source for source, targets in self.written.items() for target in targets}
 
-    def all(self) -> dict[str, str]:
+    def all(self) -> Iterator[Wire]:
         """Return the rows that follow, then those that are written."""
         levels = [str(level["name"]) for level in self.document.value["level"]]
         for at, level in enumerate(levels):
@@ -356,10 +419,25 @@ class _Rows:
                     self._outside(at, (f"{subordinate}.report", f"{level}.from_{subordinate}"), levels)
                 else:
                     self._between(at, level, subordinate)
-        return {
-            **self.rows,
-            **{source: target for source, target in self.written.items() if source not in self.rows},
+        self._check_read_once(levels)
+        for source, target in self.rows.items():
+            yield Wire(source, target)
+        for source, targets in self.written.items():
+            yield from (Wire(source, target) for target in targets if self.rows.get(source) != target)
+
+    def _check_read_once(self, levels: Sequence[str]) -> None:
+        """Note orders and reports that several would read."""
+        link = {
+            end: (level, peer)
+            for level in levels
+            for word in ("serves", "commands")
+            for peer in getattr(self.roles.get(level, Neighbours()), word)
+            for end in (f"{level}.to_{peer}", f"{level}.{peer if word == 'serves' else f'from_{peer}'}")
         }
+        for source, targets in self.written.items():
+            said = next((link[end] for end in (source, *targets) if end in link), None)
+            if len(targets) > 1 and said is not None:
+                self.document.wrong(("buffers", source, 1), *of_a_link(source, targets, *said))
 
     def _between(self, at: int, upper: str, lower: str) -> None:
         """Add the two rows between levels."""
@@ -383,12 +461,13 @@ class _Rows:
 
     def _wanted(self, source: str, target: str) -> bool:
         """Tell whether a row between levels is still missing; note one that is half written, which contradicts the declarations."""
-        by_target = {to: came for came, to in self.written.items()}
-        if source not in self.written and target not in by_target:
+        if source not in self.written and target not in self.by_target:
             return True
-        if (source in self.written) != (target in by_target):
+        if (source in self.written) != (target in self.by_target):
             came, to = (
-                (source, self.written[source]) if source in self.written else (by_target[target], target)
+                (source, self.written[source][0])
+                if source in self.written
+                else (self.by_target[target], target)
             )
             self.document.wrong(
                 ("buffers", came),
@@ -399,7 +478,7 @@ class _Rows:
 
     def _one_sided(self, at: int, says: str, other: str, word: str, end: str) -> None:
         """Note that the other level lacks the declaration, where no row connects them either."""
-        if end in self.written or end in self.written.values():
+        if end in self.written or end in self.by_target:
             return
         theirs = getattr(self.roles.get(other, Neighbours()), word)
         does = f"{word} {', '.join(f'`{name}`' for name in theirs)}" if theirs else f"{word} nobody"
@@ -414,18 +493,17 @@ class _Rows:
         """Add a row to or from a party outside, unless the level's end is written."""
         source, target = row
         inner, outer = (source, target) if source.partition(".")[0] in levels else (target, source)
-        by_target = {to: came for came, to in self.written.items()}
-        if inner in self.written or inner in by_target:
+        if inner in self.written or inner in self.by_target:
             return
         party = outer.partition(".")[0]
-        taken = {**self.written, **self.rows}
+        taken = {*self.written, *self.by_target, *self.rows, *self.rows.values()}
         known = self.document.value.get("outside")
         if known is not None and party not in known:
             self.document.wrong(
                 ("outside",), f"`{party}`, with whom `{levels[at]}` exchanges orders and reports, is neither a level nor in `outside`",
                 *nearest(party, [*levels, *known]),
             )  # fmt: skip
-        elif outer in taken or outer in taken.values():
+        elif outer in taken:
             self.document.wrong(
                 ("level", at, "name"),
                 f"`{outer}` would be an end of two buffers, one of them with `{inner}`",

@@ -252,7 +252,7 @@ def running_level(
         level,
         executor,
         tuple(Take(*take, sign.form(range(take[1], take[1] + take[2]))) for take in takes),
-        tuple(Give(name, first, first + count) for name, first, count in gives),
+        tuple(Give(name, first, first + count) for name, first, count in dict.fromkeys(gives)),
         tuple(_fill(spec, sign, feed, queries) for feed in spec.feeds),
     )
 

@@ -33,7 +33,7 @@ def _pairs(
     system: Description, programs: Mapping[str, Program]
 ) -> Iterator[tuple[tuple[str, Link], tuple[str, Link]]]:
     """Yield each superior and its subordinate, with the link as each declares it."""
-    targets = {wire.source: wire.target for wire in system.wires}
+    targets = {source: targets[0] for source, targets in system.readers().items()}  # an order has one reader
     for upper, program in programs.items():
         for role in program.roles.subordinates if program.roles is not None else ():
             lower, _, record = targets.get(f"{upper}.{role.order}", "").partition(".")

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from rcsc.base.host.described import Document, KeyPath, nearest
+from rcsc.lang.restart import ECHO, NUMBER
 from rcsc.run.adopt import Restarted, restart
 from rcsc.run.buffers import Buffers, CommonMemory
-from rcsc.run.description import BadDescription, Description
+from rcsc.run.description import BadDescription, Description, of_a_link
 from rcsc.run.executors import CExecutor, Executor, PythonExecutor, Twins, build, refuse_unproved
 from rcsc.run.levels import Query, RunningLevel, misfit, running_level
 from rcsc.run.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
-from rcsc.run.signature import Signature, Values, generated_files, signature
+from rcsc.run.signature import Leaf, Signature, Values, generated_files, signature
 
 Kind = Literal["c", "python", "both"]
 """Of executors: `both` runs the C, and holds the Python against it in every cycle."""
@@ -186,9 +187,10 @@ def check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
         for end, kind in ((wire.source, ""), (wire.target, "input")):
             owner, _, variable = end.partition(".")
             if owner in signs:
-                _check_variable(page, ("buffers", wire.source), signs[owner], variable, kind)
+                _check_variable(page, system.place_of(wire), signs[owner], variable, kind)
     if not page.faults:
         _check_ends(page, system, signs)
+        _check_readers(page, system, signs)
     for name, shown in system.displays.items():
         for place, text in enumerate(shown):
             owner, _, variable = text.partition(".")
@@ -228,7 +230,53 @@ def _check_ends(page: Document, system: Description, signs: Mapping[str, Signatu
                     [(leaf.name.removeprefix(variable), leaf.c_type, leaf.members) for leaf in leaves]
                 )
         if len(ends) == 2 and ends[0] != ends[1]:
-            page.wrong(("buffers", wire.source), f"`{wire.source}` and `{wire.target}` hold other things")
+            page.wrong(system.place_of(wire), f"`{wire.source}` and `{wire.target}` hold other things")
+
+
+def _check_readers(page: Document, system: Description, signs: Mapping[str, Signature]) -> None:
+    """Note buffers of several readers that carry orders or reports, or that the readers declare otherwise."""
+    for source, targets in system.readers().items():
+        ends = {end: _leaves(signs, end) for end in targets if end.partition(".")[0] in signs}
+        if len(targets) == 1 or not ends:
+            continue
+        first = next(iter(ends))
+        if {NUMBER, ECHO} & {leaf.name.rpartition(".")[2] for leaf in ends[first]}:
+            wrong = of_a_link(source, targets, first.partition(".")[0], source.partition(".")[0])
+            page.wrong(("buffers", source, 1), *wrong)
+            continue
+        whole = (
+            source.partition(".")[0] not in signs
+        )  # what a level gives is held against each reader by itself
+        for end, leaves in ends.items():
+            if other := _otherwise(ends[first], leaves, whole=whole):
+                page.wrong(
+                    ("buffers", source, targets.index(end)),
+                    f"`{first}` and `{end}` read one buffer, `{source}`, and differ: {other}",
+                    "declare both alike: with one type, of a file that both `use`, and one initial value",
+                )
+
+
+def _leaves(signs: Mapping[str, Signature], end: str) -> tuple[Leaf, ...]:
+    level, _, variable = end.partition(".")
+    return signs[level].leaves_of(variable)
+
+
+def _otherwise(first: Sequence[Leaf], other: Sequence[Leaf], *, whole: bool) -> str:
+    """Return how two readers of one buffer declare it otherwise; the initial value alone, where not the whole type counts."""
+    if whole and [(leaf.c_type, leaf.members) for leaf in first] != [
+        (leaf.c_type, leaf.members) for leaf in other
+    ]:
+        return "they are of other types"
+    for one, two in zip(first, other, strict=True):
+        if whole and (one.low, one.high, one.unit) != (two.low, two.high, two.unit):
+            return f"{_range(one)} against {_range(two)}"
+        if one.initial != two.initial:
+            return f"`{one.name}` begins with {one.shown(one.initial)}, `{two.name}` with {two.shown(two.initial)}"
+    return ""
+
+
+def _range(leaf: Leaf) -> str:
+    return f"`{leaf.name}` from {leaf.low} to {leaf.high}{f' {leaf.unit}' if leaf.unit else ''}"
 
 
 def check_answered(system: Description, queries: Mapping[str, Query]) -> None:

@@ -5,7 +5,7 @@ orders, and which inputs the database fills. The names of the fields are those o
 order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rcsc.lang.leaves import is_part
@@ -24,7 +24,7 @@ from rcsc.lang.model import (
     Variable,
 )
 from rcsc.lang.restart import COMMAND, ECHO, ECHOED, NUMBER, STATUS
-from rcsc.run.description import BadDescription, Description
+from rcsc.run.description import BadDescription, Description, of_a_link
 from rcsc.run.orders.roles import Neighbour
 
 
@@ -133,7 +133,9 @@ def links(system: Description, level: str, program: Program) -> Links:
             database answer is itself a key.
     """
     inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
-    outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
+    outputs = tuple(
+        (_variable(w.source), _owner(w.target)) for w in system.wires if _owner(w.source) == level
+    )
     names = {str(v.name) for v in program.variables}
     levels = {spec.name for spec in system.levels}
     written = tuple(
@@ -148,7 +150,7 @@ def links(system: Description, level: str, program: Program) -> Links:
     below: list[Below] = []
     used: set[str] = set()
     for record, owner in inputs.items():
-        back = [output for output, to in outputs.items() if to == owner]
+        back = [output for output, to in outputs if to == owner]
         if not _pairs(record, back, names):
             continue
         if f"{record}.{NUMBER}" in names:
@@ -181,7 +183,7 @@ def _declared(
     program: Program,
     roles: Roles,
     inputs: Mapping[str, str],
-    outputs: Mapping[str, str],
+    outputs: Sequence[tuple[str, str]],
     levels: set[str],
 ) -> Links:
     """Return the environment of a level that declares whom it serves and commands.
@@ -195,10 +197,11 @@ def _declared(
     for role in (*([] if roles.superior is None else [roles.superior]), *roles.subordinates):
         taken, given = (role.order, role.report) if role is roles.superior else (role.report, role.order)
         owner = inputs.get(taken)
-        if owner is None or outputs.get(given) != owner:
+        goes = next((to for output, to in outputs if output == given), "nobody")
+        if owner is None or goes != owner:
             raise BadDescription(
                 f"`{level}.{taken}` and `{level}.{given}` are one end of what `{level}` and `{role.peer}` say to each other: "
-                f"the first comes from `{owner or 'nobody'}`, the second goes to `{outputs.get(given, 'nobody')}`"
+                f"the first comes from `{owner or 'nobody'}`, the second goes to `{goes}`"
             )
         used |= {*leaves_under(program, taken)}
         if role is roles.superior:
@@ -271,7 +274,7 @@ def _unread(
     program: Program,
     level: str,
     inputs: Mapping[str, str],
-    outputs: Mapping[str, str],
+    outputs: Sequence[tuple[str, str]],
     levels: set[str],
     seen: set[str],
 ) -> tuple[str, ...]:
@@ -281,10 +284,11 @@ def _unread(
     neighbour that gives a record and takes one.
     """
     descriptions = []
-    for owner in dict.fromkeys((*inputs.values(), *outputs.values())):
+    ways = inputs.items(), outputs
+    for owner in dict.fromkeys((*inputs.values(), *(to for _, to in outputs))):
         if owner in seen:
             continue
-        ends = [record for wires in (inputs, outputs) for record, to in wires.items() if to == owner]
+        ends = [record for wires in ways for record, to in wires if to == owner]
         fields = {
             leaf.rpartition(".")[2]
             for record in ends
@@ -292,8 +296,8 @@ def _unread(
             if "." in leaf
         }
         both = all(
-            any(to == owner and len(leaves_under(program, record)) > 1 for record, to in wires.items())
-            for wires in (inputs, outputs)
+            any(to == owner and len(leaves_under(program, record)) > 1 for record, to in wires)
+            for wires in ways
         )
         if owner in levels or fields & {NUMBER, COMMAND, ECHO, ECHOED} or (both and not seen):
             missing = [part for part in (NUMBER, COMMAND, ECHO, ECHOED) if part not in fields]
@@ -348,6 +352,12 @@ def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
             raise BadDescription(f"`{end}` is filled twice")
         if any(variable.kind is not Kind.INPUT for variable in _at_end(programs, end)):
             raise BadDescription(f"`{end}` is filled, and is no input")
+    for source, targets in system.readers().items():
+        parts = {
+            str(one.name).rpartition(".")[2] for end in (source, *targets) for one in _at_end(programs, end)
+        }
+        if len(targets) > 1 and {NUMBER, ECHO} & parts:
+            raise BadDescription(of_a_link(source, targets, _owner(source), _owner(targets[0]))[0])
     for wire in system.wires:
         given, taken = (
             {

@@ -262,25 +262,22 @@ class Commands:
         return names_text(found).splitlines()
 
     def _buffers(self, rest: str) -> Output:
-        every = [
-            wire for wire in self.session.system.description.wires if rest in wire.source + " " + wire.target
-        ]
+        readers = self.session.system.description.readers()
+        every = {source: ends for source, ends in readers.items() if rest in " ".join((source, *ends))}
         if not every:
-            raise typed_names.unknown(
-                rest, "buffer", [w.source for w in self.session.system.description.wires]
-            )
+            raise typed_names.unknown(rest, "buffer", list(readers))
         frozen = self.session.memory.frozen
         return [
-            f"{wire.source} = {wire.target}: {self._held(wire.source, wire.target)}{', frozen' * (wire.source in frozen)}"
-            for wire in every
+            f"{source} = {', '.join(ends)}: {self._held(source, *ends)}{', frozen' * (source in frozen)}"
+            for source, ends in every.items()
         ]
 
-    def _held(self, source: str, target: str) -> str:
-        """A buffer's latest value, in the words of the level at either end."""
-        latest = self.session.memory.latest(source)
+    def _held(self, *ends: str) -> str:
+        """A buffer's latest value, in the words of the first level among its ends, the one that fills it before its readers."""
+        latest = self.session.memory.latest(ends[0])
         if latest is None:
             return "nothing yet"
-        for end in (source, target):
+        for end in ends:
             name, _, variable = end.partition(".")
             level = typed_names.by_name(self.session.levels).get(name)
             if level is not None:

@@ -59,7 +59,7 @@ class Session:
     def __init__(self, system: System, plant: Origin) -> None:
         self.system, self.plant = system, plant
         self.attached = system if isinstance(system, AttachedSystem) else None
-        buffers = {wire.source: system.buffers.latest(wire.source) for wire in system.description.wires}
+        buffers = {name: system.buffers.latest(name) for name in system.description.readers()}
         self.memory = history.Memory({name: held for name, held in buffers.items() if held is not None})
         system.buffers = self.memory
         self.chosen = system.levels[0].name
@@ -301,7 +301,7 @@ class Session:
             Refused: There is no such buffer.
         """
         self._here("frozen, buffer by buffer,")
-        known = [wire.source for wire in self.system.description.wires]
+        known = list(self.system.description.readers())
         if buffer not in known:
             raise Refused(Code.SHELL_NAME, f"there is no buffer `{buffer}`", *nearest(buffer, known))
         self._keep()

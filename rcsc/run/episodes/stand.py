@@ -136,8 +136,8 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
     edges = {name: _edges(program) for name, program in programs.items()}
     buffers = outside_buffers(system, signs)
     return Stand(
-        path, system, signs, programs, ordered(system, signs), tuple(wire.source for wire in system.wires),
-        buffers, edges, tuple(_fields(system, buffers, programs, edges)), files,
+        path, system, signs, programs, ordered(system, signs), tuple(system.readers()),
+        buffers, edges, tuple(_fields(system, signs, buffers, programs, edges)), files,
     )  # fmt: skip
 
 
@@ -151,16 +151,19 @@ def _edges(program: Program) -> dict[str, tuple[Value, ...]]:
 
 def _fields(
     system: Description,
+    signs: Mapping[str, Signature],
     buffers: tuple[OutsideBuffer, ...],
     programs: Mapping[str, Program],
     edges: Mapping[str, Mapping[str, tuple[Value, ...]]],
 ) -> list[Field]:
     """Return the fields from outside that are not the protocol's: of an order none, of a report those that a device measures."""
-    level_of = {wire.source: wire.target.partition(".")[0] for wire in system.wires}
+    read_by = system.readers()
     fields = []
     keys = {(spec.name, key) for spec in system.levels for feed in spec.feeds for key in feed.keys}
     for buffer in buffers:
-        level = level_of[buffer.name]
+        readers = [(end.partition(".")[0], end.partition(".")[2]) for end in read_by[buffer.name]]
+        level = readers[0][0]  # the others declare it alike
+        runs = [signs[name].leaves_of(variable) for name, variable in readers]
         repeated = {
             adopted.leaf for adopted in programs[level].adopted.values() if isinstance(adopted, After)
         }
@@ -174,9 +177,12 @@ def _fields(
             asked = (level, leaf.name) in keys  # a feed is asked about it before the level refuses it
             refused = () if asked else tuple(_refused(variable))
             past = () if asked else tuple(_past(variable))
-            fields.append(
-                Field(column, buffer.name, place, level, leaf, edges[level][leaf.name], refused, past)
+            turns = dict.fromkeys(
+                value
+                for (name, _), run in zip(readers, runs, strict=True)
+                for value in edges[name][run[place].name]
             )
+            fields.append(Field(column, buffer.name, place, level, leaf, tuple(turns), refused, past))
     return fields
 
 

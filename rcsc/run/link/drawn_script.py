@@ -80,7 +80,7 @@ def script(
         publishes: Published = {}
         for wire in system.wires:
             level, _, variable = wire.target.partition(".")
-            if wire.source.partition(".")[0] in signs or random.random() < 0.6:
+            if wire.source.partition(".")[0] in signs or wire.source in publishes or random.random() < 0.6:
                 continue
             leaves = signs[level].leaves_of(variable)
             before = last.get(wire.source, tuple(leaf.initial for leaf in leaves))

@@ -1,6 +1,6 @@
 """A linked system to C99: header, source, CMake and pkg-config files."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias, assert_never
 
 from rcsc.code.emit.c.ctext import c_type
@@ -153,7 +153,12 @@ class _Maker:
 
     def _members(self, side: str, party: str) -> Fields:
         buffers = (b for b in self.system.buffers if (b.side, b.party) == (side, party))
-        return [(buffer.end.declared(buffer.name), _doc(buffer)) for buffer in buffers]
+        return [(buffer.end.declared(buffer.name), _doc(buffer, self._readers(buffer))) for buffer in buffers]
+
+    def _readers(self, buffer: Buffer) -> list[Buffer]:
+        """Return a place with each of its readers."""
+        takes = (taken for level in self.system.levels for taken in level.takes)
+        return [taken for taken in takes if taken.place == buffer.place] or [buffer]
 
     # --- functions ---
 
@@ -351,13 +356,19 @@ def _has_reals(program: LevelProgram) -> bool:
     return any(leaf.c_type in REALS for leaf in program.sign.leaves)
 
 
-def _doc(buffer: Buffer) -> str:
-    """Return the comment of a buffer: both ends, the range, and the treatment of a reading beyond it."""
-    words = [f"{buffer.wire.source} = {buffer.wire.target}", range_text(buffer.end.kind)]
+def _doc(buffer: Buffer, readers: Sequence[Buffer]) -> str:
+    """Return the comment of a buffer: all ends, the range, and the treatment of a reading beyond it."""
+    targets = ", ".join(taken.wire.target for taken in readers)
+    words = [f"{buffer.wire.source} = {targets}", range_text(buffer.end.kind)]
     if buffer.side == IN and isinstance(buffer.end.kind, Scalar) and range_text(buffer.end.kind):
-        variable = buffer.end.program.plan.program.variable(buffer.end.variable)
-        words.append("pulled to the range" if variable.admit is Admit.CLAMP else "refused beyond it")
+        words += dict.fromkeys(_beyond(taken.target) for taken in readers if taken.target is not None)
     return "; ".join(word for word in words if word)
+
+
+def _beyond(end: End) -> str:
+    """Return what a reader does with a reading beyond its range."""
+    clamped = end.program.plan.program.variable(end.variable).admit is Admit.CLAMP
+    return "pulled to the range" if clamped else "refused beyond it"
 
 
 def _due(level: LinkedLevel, *body: Stmt) -> Body:

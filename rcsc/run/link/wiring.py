@@ -6,7 +6,7 @@ of each end, and what the database is asked.
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rcsc.base.host.files.read import CheckedFields, json_of
 from rcsc.code.emit.c.ctext import declared
@@ -83,11 +83,12 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Buffer:
-    """A buffer.
+    """A buffer and one of its readers.
 
     Attributes:
         wire: As the description says.
         source: The end in the level that fills it; None where it is filled from outside. `target` likewise.
+        end: The end whose type the buffer has: its first reader's, if that is a level.
         side: Which member of the system's struct it stands in: `in`, `out` or `between`.
         party: Whom in there it belongs to; empty in `between`.
         name: What it is called there.
@@ -96,16 +97,10 @@ class Buffer:
     wire: Wire
     source: End | None
     target: End | None
+    end: End
     side: str
     party: str
     name: str
-
-    @property
-    def end(self) -> End:
-        """The end whose type the buffer has: the reader's, if that is a level."""
-        end = self.target or self.source
-        assert end is not None
-        return end
 
     @property
     def place(self) -> str:
@@ -143,7 +138,7 @@ class LinkedLevel:
         member: What the system's struct calls it.
         constant: The constant that names it.
         ticks: The ticks of its period.
-        takes: The buffers that it reads, in the description's order; `gives` those that it fills.
+        takes: The buffers that it reads, in the description's order; `gives` those that it fills, each once.
     """
 
     name: str
@@ -164,6 +159,7 @@ class Linked:
     Attributes:
         word: Prefix of all its C names, and stem of its files.
         source: The description's file, as generated files name it.
+        buffers: Each place once, with its first reader.
     """
 
     word: str
@@ -228,7 +224,15 @@ def linked(system: Description, plans: Mapping[str, Plan], source: str) -> Linke
         )
         for spec in system.levels
     )
-    return Linked(word, source, system.tick_ms, levels, buffers)
+    return Linked(word, source, system.tick_ms, levels, _once(buffers))
+
+
+def _once(buffers: Iterable[Buffer]) -> tuple[Buffer, ...]:
+    """Return the first buffer at each place: what several read stands in one."""
+    every: dict[str, Buffer] = {}
+    for buffer in buffers:
+        every.setdefault(buffer.place, buffer)
+    return tuple(every.values())
 
 
 def _program(plan: Plan) -> LevelProgram:
@@ -250,7 +254,7 @@ def _level(
         level,
         level.period_ms // tick_ms,
         tuple(buffer for buffer in buffers if buffer.target is not None and buffer.target.level == spec.name),
-        tuple(buffer for buffer in buffers if buffer.source is not None and buffer.source.level == spec.name),
+        _once(buffer for buffer in buffers if buffer.source is not None and buffer.source.level == spec.name),
         tuple(wiring.question(spec, at) for at, _ in enumerate(spec.feeds)),
     )
 
@@ -264,6 +268,7 @@ class _Wiring:
         members: Names taken in each struct of buffers.
         parties: What each party outside is called on each side.
         functions: The function of each question, by its name and its types.
+        places: The buffers that levels read, by name, with the first reader.
     """
 
     programs: Mapping[str, LevelProgram]
@@ -271,23 +276,33 @@ class _Wiring:
     members: dict[str, NameScope] = field(default_factory=dict)
     parties: dict[tuple[str, str], str] = field(default_factory=dict)
     functions: dict[tuple[str, ...], str] = field(default_factory=dict)
+    places: dict[str, Buffer] = field(default_factory=dict)
     scope: NameScope = field(init=False)
 
     def __post_init__(self) -> None:
         self.scope = c_scope({f"{self.word}_{end}" for end in OWN})
 
     def buffer(self, wire: Wire) -> Buffer:
-        """Return a buffer with its ends and its place."""
-        ends = [self._wired(text) for text in (wire.source, wire.target)]
-        source, target = ends
+        """Return a buffer with its ends and its place, which all levels that read it share."""
+        source, target = self._wired(wire.source), self._wired(wire.target)
+        if target is not None:
+            if wire.source in self.places:
+                return replace(self.places[wire.source], wire=wire, target=target)
+            self.places[wire.source] = self._placed(wire, source, target)
+            return self.places[wire.source]
+        return self._placed(wire, source, target)
+
+    def _placed(self, wire: Wire, source: End | None, target: End | None) -> Buffer:
+        end = target or source
+        assert end is not None
         if source is not None and target is not None:
-            return Buffer(wire, source, target, BETWEEN, "", self._member(BETWEEN, wire.source))
+            return Buffer(wire, source, target, end, BETWEEN, "", self._member(BETWEEN, wire.source))
         side, outer = (IN, wire.source) if source is None else (OUT, wire.target)
         owner, _, variable = outer.partition(".")
         if (side, owner) not in self.parties:
             self.parties[side, owner] = self._member(side, owner)
         party = self.parties[side, owner]
-        return Buffer(wire, source, target, side, party, self._member(f"{side} {party}", variable))
+        return Buffer(wire, source, target, end, side, party, self._member(f"{side} {party}", variable))
 
     def question(self, spec: LevelSpec, at: int) -> Question:
         """Return a query of a level; queries of one name and one form are one function."""

@@ -211,6 +211,10 @@ def fingerprints(system: Description) -> dict[str, str]:
 
 
 def outside_wires(system: Description) -> tuple[Wire, ...]:
-    """The buffers that no level fills."""
+    """The buffers that no level fills, each once, with its first reader."""
     levels = {level.name for level in system.levels}
-    return tuple(wire for wire in system.wires if wire.source.partition(".")[0] not in levels)
+    return tuple(
+        Wire(source, targets[0])
+        for source, targets in system.readers().items()
+        if source.partition(".")[0] not in levels
+    )

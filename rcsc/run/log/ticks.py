@@ -159,11 +159,11 @@ def tick_of(log: Log, tick: int, wires: Mapping[str, str]) -> LoggedTick:
 
 
 def other_ends(wires: Iterable[Wire]) -> dict[str, str]:
-    """Return who is at the other end of each variable, `level.variable`."""
+    """Return who is at the other end of each variable, `level.variable`; of several readers the first: orders and reports have one."""
     others: dict[str, str] = {}
     for wire in wires:
         others[wire.target] = wire.source.partition(".")[0]
-        others[wire.source] = wire.target.partition(".")[0]
+        others.setdefault(wire.source, wire.target.partition(".")[0])
     return others
 
 

@@ -104,13 +104,13 @@ class OutsideBuffer:
 
 
 def outside_buffers(system: Description, signs: Mapping[str, Signature]) -> tuple[OutsideBuffer, ...]:
-    """Return the buffers from outside to a level."""
-    buffers = []
+    """Return the buffers from outside to a level; of several readers the first has the say, for they are declared alike."""
+    buffers: dict[str, OutsideBuffer] = {}
     for wire in system.wires:
         level, _, variable = wire.target.partition(".")
-        if level in signs and wire.source.partition(".")[0] not in signs:
-            buffers.append(OutsideBuffer(wire.source, signs[level].leaves_of(variable)))
-    return tuple(buffers)
+        if level in signs and wire.source.partition(".")[0] not in signs and wire.source not in buffers:
+            buffers[wire.source] = OutsideBuffer(wire.source, signs[level].leaves_of(variable))
+    return tuple(buffers.values())
 
 
 def script_path(name: str, folder: Path) -> Path:

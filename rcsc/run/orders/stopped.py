@@ -187,7 +187,7 @@ class StoppedRuns:
 
     def _buffers(self) -> Iterator[str]:
         """Yield the names of all buffers that may hold a published value."""
-        yield from dict.fromkeys(wire.source for wire in self.system.wires)
+        yield from self.system.readers()
         yield from self.between
 
 

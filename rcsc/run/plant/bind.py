@@ -17,7 +17,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.described import BadFile, Document, KeyPath, nearest
 from rcsc.base.host.files.read import xml_of
 from rcsc.run.declared_plant import PlantSpec
-from rcsc.run.description import Description, Wire
+from rcsc.run.description import Description
 from rcsc.run.levels import StateTableError
 from rcsc.run.orders.roles import served
 from rcsc.run.plant import fields
@@ -251,21 +251,17 @@ def buffers_of(
     system: Description, signs: Mapping[str, Signature], parties: Sequence[str]
 ) -> tuple[Buffer, ...]:
     """Return the buffers between the levels and these parties, with the plant's field of each."""
-    buffers = []
+    buffers: dict[str, Buffer] = {}
     for wire in system.wires:
         for end, other, gives in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
             party, _, name = end.partition(".")
             level, _, variable = other.partition(".")
-            if party in parties and level in signs:
-                leaves = signs[level].leaves_of(variable)
-                buffers.append(
-                    Buffer(wire.source, end, (party, *name.split(".")), leaves, other, gives, _path(wire))
+            if party in parties and level in signs and end not in buffers:  # of several readers the first
+                leaves, place = signs[level].leaves_of(variable), system.place_of(wire)
+                buffers[end] = Buffer(
+                    wire.source, end, (party, *name.split(".")), leaves, other, gives, place
                 )
-    return tuple(buffers)
-
-
-def _path(wire: Wire) -> KeyPath:
-    return ("buffers", wire.source)
+    return tuple(buffers.values())
 
 
 # --- checked once ---

@@ -296,10 +296,10 @@ class AttachedSystem(System):
         self._sent.pop(level.name, None)
 
     def _take_buffers(self) -> None:
-        for wire in self.description.wires:
-            latest = self.link.memory.latest(wire.source)
+        for name in self.description.readers():
+            latest = self.link.memory.latest(name)
             if latest is not None:
-                self.buffers.publish(wire.source, latest)
+                self.buffers.publish(name, latest)
 
 
 def attach(found: RunningSystem, kind: Kind, queries: Mapping[str, Query]) -> AttachedSystem:

@@ -58,12 +58,12 @@ def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
     """
     needs_data(system)
     page = system.review()
-    targets = {wire.source: wire.target for wire in system.wires}
+    targets = system.readers()
     for source, (level, record, fields) in BUFFERS.items():
         inner = f"{level}.{record}"
         if level not in signs:
             page.wrong(("level",), f"the cell needs a level `{level}`, for buffer `{source}`")
-        elif source not in targets or inner not in (source, targets[source]):
+        elif source not in targets or inner not in (source, *targets[source]):
             page.wrong(("buffers",), f"the cell needs buffer `{source}`, with `{inner}` at the level's end")
         else:
             sign = signs[level]

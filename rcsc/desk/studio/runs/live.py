@@ -237,8 +237,8 @@ class Live(Concern):
             "breaks": [{"number": stop.number, "text": stop.text} for stop in session.stops.every],
             "faults": [{"name": name, "on": name in session.faults} for name in faults_of(session.plants)],
             "buffers": [
-                {"name": wire.source, "to": wire.target, "frozen": wire.source in session.memory.frozen}
-                for wire in system.description.wires
+                {"name": source, "to": ", ".join(targets), "frozen": source in session.memory.frozen}
+                for source, targets in system.description.readers().items()
             ],
             "undo": session.kept,
         }
