@@ -20,9 +20,9 @@ from rcsc.code.testing.executors.native import COMPILE_S
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
-from rcsc.lang.project import PROJECT_FILE, prefix, project_root, systems_above
+from rcsc.lang.project import PROJECT_FILE, Instance, prefix, project_root, systems_above
 from rcsc.proof.solvers.options import Options
-from rcsc.run.description import BadDescription, description, places
+from rcsc.run.description import BadDescription, Description, LevelSpec, description, places
 from rcsc.run.link import Linked, emit_system, linked, outward
 
 DESCRIPTION = "system.toml"
@@ -51,7 +51,7 @@ def compile_(
     """
     systems = tuple(systems_in(settings.paths))
     folder = out or _folder(systems)
-    project = proved(replace(settings, paths=tables_in(settings.paths, systems)))
+    project = proved(with_levels(settings, systems))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
@@ -114,11 +114,35 @@ def systems_in(paths: Iterable[str]) -> Iterator[Path]:
 
 
 def tables_in(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, ...]:
-    """Return the paths to read tables from: those given that are no descriptions, and the programs of the systems' levels."""
-    given = [path for path in paths if Path(path) not in systems]
-    tried = (places(path, spec.program) for path in systems for spec in description(path).levels)
-    levels = (next((file for file in files if file.is_file()), None) for files in tried)
-    return tuple(dict.fromkeys([*given, *(str(file) for file in levels if file is not None)]))
+    """Return the files to read tables from: those given that are no descriptions, and those of the systems' levels."""
+    return _given(paths, systems, (str(file) for *_, file in _levels(systems)))
+
+
+def with_levels(settings: Settings, systems: tuple[Path, ...]) -> Settings:
+    """Return the settings with the programs of the systems' levels, instances too, in place of the descriptions."""
+    programs: dict[str, Instance | None] = {}
+    for system, spec, file in _levels(systems):
+        instance = system.instance(spec, str(file))
+        programs[str(file) if instance is None else instance.root] = instance
+    instances = {root: instance for root, instance in programs.items() if instance is not None}
+    return replace(settings, paths=_given(settings.paths, systems, programs), instances=instances)
+
+
+def _given(paths: tuple[str, ...], systems: tuple[Path, ...], levels: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys([*(path for path in paths if Path(path) not in systems), *levels]))
+
+
+def _levels(systems: tuple[Path, ...]) -> Iterator[tuple[Description, LevelSpec, Path]]:
+    """Yield each level that has tables, with their file."""
+    for path in systems:
+        system = description(path)
+        for spec in system.levels:
+            if (file := _root(path, spec)) is not None:
+                yield system, spec, file
+
+
+def _root(path: Path, spec: LevelSpec) -> Path | None:
+    return next((file for file in places(path, spec.source) if file.is_file()), None)
 
 
 def _folder(systems: tuple[Path, ...]) -> Path:
@@ -256,19 +280,26 @@ class Generated:
         system, page = description(path), description(path).review()
         plans = {}
         for at, spec in enumerate(system.levels):
-            files = [file for file in places(path, spec.program) if os.path.realpath(file) in self.plans]
-            if files:
-                plans[spec.name] = self.plans[os.path.realpath(files[0])]
+            plan = self._plan(path, system, spec)
+            if plan is not None:
+                plans[spec.name] = plan
             else:
-                key = "name" if spec.program == spec.name else "program"
-                tried = " and ".join(f"`{file}`" for file in places(path, spec.program))
-                page.wrong(("level", at, key), f"there is no program `{spec.program}`", f"looked for {tried}")
+                tried = " and ".join(f"`{file}`" for file in places(path, spec.source))
+                page.wrong(
+                    ("level", at, spec.key), f"there is no program `{spec.source}`", f"looked for {tried}"
+                )
         if page.faults:
             raise page.bad(BadDescription)
         source = os.path.relpath(path, project_root(str(path))).replace("\\", "/")
         whole = self.systems[path] = linked(system, plans, source)
         if self._add(str(path), emit_system(whole)):
             self._share(str(path), "c", outward(whole))
+
+    def _plan(self, path: Path, system: Description, spec: LevelSpec) -> Plan | None:
+        """Return the plan of a level's program, if that was added."""
+        file = _root(path, spec)
+        instance = None if file is None else system.instance(spec, str(file))
+        return self.plans.get(os.path.realpath(str(file) if instance is None else instance.root))
 
     def _add(self, root: str, files: Mapping[str, str]) -> bool:
         """Add files, if no other text goes to one of them already; types that programs share have one text."""

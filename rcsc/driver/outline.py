@@ -66,11 +66,11 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
     try:
         described = description(system)
         for spec in described.levels:
-            programs[spec.name], loaded = loaded_program(system, spec.program)
+            programs[spec.name], loaded = loaded_program(system, described, spec)
             files = digests(loaded)
             if files is None:
                 return None
-            looked_at |= {str(path): digest_at(str(path)) for path in places(system, spec.program)} | files
+            looked_at |= {str(path): digest_at(str(path)) for path in places(system, spec.source)} | files
         systems = transition_systems_of(described, programs)
     except (BadDescription, NoProgramError):
         return None
@@ -111,11 +111,16 @@ def keep_lines(
     `stood` is the description's digest from before it was read; the programs are by name as they were loaded.
     """
     looked_at = {str(system): stood}
-    for program, files in loaded.items():
+    looked_at |= {
+        str(path): digest_at(str(path))
+        for spec in description(system).levels
+        for path in places(system, spec.source)
+    }
+    for files in loaded.values():
         known = digests(files)
         if known is None:
             return
-        looked_at |= {str(path): digest_at(str(path)) for path in places(system, program)} | known
+        looked_at |= known
     if digest_at(str(system)) == stood:
         cache.store(_Said(lines, looked_at), *key)
 

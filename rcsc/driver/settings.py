@@ -1,7 +1,7 @@
 """What the commands are given, and what they hand back."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ from rcsc.base.diagnostics.report import Report, TableReport
 
 if TYPE_CHECKING:
     from rcsc.lang.model import Program, ProvedProgram
+    from rcsc.lang.project import Instance
     from rcsc.proof.solvers.options import Options
 
 
@@ -24,6 +25,7 @@ class Settings:
     Attributes:
         paths: Files, folders, or `-`.
         stdin: The text that `-` stands for.
+        instances: Which of the paths are no files, but instances of one.
         use_cache: Whether earlier proofs may be used and new ones kept.
         progress: Called with what is being done; with an empty text when it is over.
     """
@@ -33,6 +35,7 @@ class Settings:
     stdin: bytes | None = None
     use_cache: bool = True
     progress: Callable[[str], None] = silent
+    instances: "Mapping[str, Instance]" = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -276,7 +276,7 @@ def _beside(tried: Iterable[tuple[Path, Path]], file: str) -> bool:
 def _roots(system: Path) -> list[tuple[Path, Path]]:
     """Return the two places where the root file of each level may stand; none where the system is not in order."""
     try:
-        return [places(system, spec.program) for spec in description(system).levels]
+        return [places(system, spec.source) for spec in description(system).levels]
     except BadDescription:
         return []
 

@@ -21,6 +21,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
 from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
 from rcsc.lang.operator_table import Operator, single, spell_single
+from rcsc.lang.project import Instance
 from rcsc.lang.restart import SEEN, Adopted, Part, by_names
 
 VariableName = NewType("VariableName", str)
@@ -1053,7 +1054,7 @@ class Program:
     """One root file and all that it uses: what is checked and compiled together.
 
     Attributes:
-        name: The root file's stem: names the generated files.
+        name: The root file's stem, or the instance's name: names the generated files.
         file: The root file.
         enums: In order of declaration, used files first (likewise all below).
         variables: Every leaf.
@@ -1062,6 +1063,7 @@ class Program:
         roles: None where the protocol is written by hand, or there is none.
         restart: What leaves adopt when the level starts anew (`rcsc.lang.restart`); None where nothing declares it, and names decide.
         environment: What is assumed over time of what comes from outside: trusted, and claimed by nobody.
+        instance: What it is an instance of, as it was asked for; None where it is the file's own program.
     """
 
     name: str
@@ -1081,6 +1083,12 @@ class Program:
     roles: Roles | None = None
     restart: tuple[tuple[VariableName, Adopted], ...] | None = None
     environment: tuple[Property, ...] = ()
+    instance: Instance | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def root(self) -> str:
+        """What the program is called where programs are told apart by their root files."""
+        return self.file if self.instance is None else self.instance.root
 
     @property
     def stated(self) -> tuple[Property, ...]:

@@ -6,7 +6,7 @@ In: paths as the user gave them. Out: `Loaded`; what cannot be read or found is 
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +27,45 @@ PREFIX = re.compile(r"(?:[A-Za-z][A-Za-z0-9_]{0,7})?")
 
 
 @dataclass(frozen=True, slots=True)
+class InstanceParameter:
+    """A declared constant that an instance sets: a bool, a number, or a member's name. `span`: where it is set."""
+
+    name: str
+    value: bool | int | float | str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """One of several programs of a root file.
+
+    Attributes:
+        file: The root file.
+        name: Of the program, and of its level, whatever the file calls it.
+        parameters: Constants with other values than those that the files declare.
+        span: Where somebody asks for it, for what is wrong with the whole.
+    """
+
+    file: str
+    name: str
+    parameters: tuple[InstanceParameter, ...]
+    span: Span = field(compare=False, repr=False)
+
+    @property
+    def root(self) -> str:
+        """What the program is called where programs are told apart by their root files."""
+        return f"{self.file} ({self.name})"
+
+    @property
+    def shown(self) -> str:
+        """Its parameters in words: `limit_mm = 1500, fast = true`."""
+        return ", ".join(
+            f"{one.name} = {str(one.value).lower() if isinstance(one.value, bool) else one.value}"
+            for one in self.parameters
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Loaded:
     """Parsed files.
 
@@ -37,6 +76,7 @@ class Loaded:
         uses: For each file the files that it uses.
         sources: Every text.
         diagnostics: What could not be read, found or parsed.
+        instances: Roots that are no files, each an instance of one.
     """
 
     given: tuple[str, ...]
@@ -45,6 +85,11 @@ class Loaded:
     uses: Mapping[str, tuple[str, ...]]
     sources: Mapping[str, Source]
     diagnostics: tuple[Diagnostic, ...]
+    instances: Mapping[str, Instance] = field(default_factory=dict)
+
+    def file_of(self, root: str) -> str:
+        """Return the file of a root: itself, or the one that it is an instance of."""
+        return self.instances[root].file if root in self.instances else root
 
 
 def load(
@@ -52,6 +97,7 @@ def load(
     stdin: str | bytes | None = None,
     stdin_name: str = "-",
     overlay: Mapping[str, str] | None = None,
+    instances: Mapping[str, Instance] | None = None,
 ) -> Loaded:
     """Read and parse files, folders and (`-`) the text `stdin`, and all that they use.
 
@@ -60,15 +106,23 @@ def load(
         stdin: The text for `-`.
         stdin_name: Its name in messages.
         overlay: Texts that stand for what is on disk, by real path: an editor's, saved or not.
+        instances: What paths mean that are no files.
     """
-    loader = _Loader(stdin, stdin_name, overlay or {})
+    loader = _Loader(stdin, stdin_name, overlay or {}, instances or {})
     roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
     for file in roots:
-        loader.reach(file)
+        loader.reach(loader.made[file].file if file in loader.made else file)
     diagnostics = tuple(sorted(set(loader.diagnostics), key=sort_key))
     uses = {file: tuple(used) for file, used in loader.uses.items()}
     heads = _heads(roots, {path for path in paths if not os.path.isdir(path)}, uses)
-    return Loaded(roots, heads, loader.files, uses, loader.sources, diagnostics)
+    return Loaded(roots, heads, loader.files, uses, loader.sources, diagnostics, loader.made)
+
+
+def again(program_file: str, instance: Instance | None, overlay: Mapping[str, str] | None = None) -> Loaded:
+    """Read the files of a program once more: of an instance, with its constants."""
+    if instance is None:
+        return load([program_file], overlay=overlay)
+    return load([instance.root], overlay=overlay, instances={instance.root: instance})
 
 
 def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
@@ -180,6 +234,7 @@ class _Loader:
 
     Attributes:
         named: The name of each file by its real path: the one it was first reached by.
+        instances: Roots that are instances of a file, as they were asked for; `made`, with the file by its name here.
         unread: Files that could not be read.
         excluded: The patterns of each project, by its root.
         root_of: The project root of each folder.
@@ -188,6 +243,8 @@ class _Loader:
     stdin: str | bytes | None
     stdin_name: str
     overlay: Mapping[str, str] = field(default_factory=dict)
+    instances: Mapping[str, Instance] = field(default_factory=dict)
+    made: dict[str, Instance] = field(default_factory=dict)
     files: "dict[str, tree.File]" = field(default_factory=dict)
     uses: dict[str, list[str]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
@@ -205,7 +262,11 @@ class _Loader:
 
     def roots(self, path: str) -> Iterator[str]:
         """Yield the files that a path of the user's means."""
-        if path == "-":
+        if path in self.instances:
+            for file in self.roots(self.instances[path].file):
+                self.made[path] = replace(self.instances[path], file=file)
+                yield path
+        elif path == "-":
             yield self.stdin_name
         elif os.path.isdir(path):
             inside = list(self._inside(path))

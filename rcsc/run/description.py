@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Source
@@ -19,6 +19,7 @@ from rcsc.base.host.described import (
     Either,
     Entries,
     FileName,
+    Flag,
     KeyPath,
     Listing,
     Member,
@@ -26,12 +27,21 @@ from rcsc.base.host.described import (
     Record,
     Text,
     Word,
+    fits,
     nearest,
     read_document,
 )
-from rcsc.base.host.files.names import BadName, is_member, member, within
-from rcsc.base.host.files.read import CheckedFields
-from rcsc.lang.project import Neighbours, neighbours, project_root
+from rcsc.base.host.files.names import BadName, is_identifier, is_member, member, within
+from rcsc.base.host.files.read import CheckedFields, Malformed
+from rcsc.lang.project import (
+    Instance,
+    InstanceParameter,
+    Loaded,
+    Neighbours,
+    again,
+    neighbours,
+    project_root,
+)
 from rcsc.run.declared_plant import PlantSpec, plants
 
 
@@ -43,7 +53,11 @@ LONGEST_MS, MOST_LEVELS, MOST_WITHIN = 3_600_000, 10_000, 1_000_000
 WITHIN = 5000
 """Cycles without a fault in which every command from outside ends, where the description says nothing else."""
 FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
-LEVEL = Record({"name": Word()}, {"program": Word(), "feed": Listing(FEED)})
+PARAMETER = Either((Flag(), Number(-1.7e308, 1.7e308), Word()))
+LEVEL = Record(
+    {"name": Word()},
+    {"program": Word(), "tables": Word(), "parameters": Entries(PARAMETER), "feed": Listing(FEED)},
+)
 SYSTEM = Record(
     {
         "name": FileName(),
@@ -84,13 +98,41 @@ class Feed:
     keys: tuple[str, ...]
 
 
+Constant: TypeAlias = bool | int | float | str
+"""A value of a declared constant; a text is a member's name."""
+
+
 @dataclass(frozen=True, slots=True)
 class LevelSpec:
-    """One control level."""
+    """One control level.
+
+    Attributes:
+        program: What is generated for it is called so.
+        tables: Stem of the file that its tables are in, where the program is an instance of that file; else empty.
+        parameters: Constants of an instance, with their values.
+    """
 
     name: str
     program: str
     feeds: tuple[Feed, ...]
+    tables: str = field(default="", repr=False)
+    parameters: tuple[tuple[str, Constant], ...] = field(default=(), repr=False)
+
+    @property
+    def source(self) -> str:
+        """The stem of the file that its tables are in."""
+        return self.tables or self.program
+
+    @property
+    def key(self) -> str:
+        """The key of the description that says so."""
+        return (
+            "tables"
+            if self.tables not in {"", self.name}
+            else "program"
+            if self.program != self.name
+            else "name"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +196,39 @@ class Description:
         """Return where the description says that a buffer goes to a reader; where several read it, the reader's element of the list."""
         return "buffers", wire.source, self.readers()[wire.source].index(wire.target)
 
+    def instance(self, spec: LevelSpec, file: str) -> Instance | None:
+        """Return what a level's program is an instance of, with the places of the description; None where it is the file's own.
+
+        Args:
+            spec: The level.
+            file: Where its tables are.
+        """
+        if not spec.tables:
+            return None
+        page, at = self.review(), self.levels.index(spec)
+        parameters = tuple(
+            InstanceParameter(name, value, page.span(("level", at, "parameters", name)))
+            for name, value in spec.parameters
+        )
+        where = "parameters" if parameters else spec.key
+        return Instance(file, spec.name, parameters, page.span(("level", at, where)))
+
+    def load(self, path: Path, spec: LevelSpec) -> Loaded | None:
+        """Read the files of a level's program; None where there is no root file.
+
+        Args:
+            path: Of this description, beside which they stand.
+            spec: The level.
+        """
+        file = next((place for place in places(path, spec.source) if place.is_file()), None)
+        if file is None:
+            return None
+        loaded = again(str(file), self.instance(spec, str(file)))
+        page = self.review()
+        return (
+            replace(loaded, sources={**loaded.sources, page.name: page.source}) if spec.parameters else loaded
+        )
+
     def review(self) -> Document:
         """Return a fresh page for errors, with the places of this description."""
         if self.document is None:
@@ -170,6 +245,7 @@ def description(path: Path) -> Description:
     document = read_document(path, Code.BAD_SYSTEM, BadDescription)
     document.check(SYSTEM)
     if document.holds(PARTIES):
+        _check_tables(document)
         roots = {level["name"]: _root(path, level) for level in document.value["level"]}
         roles = {name: neighbours(root) for name, root in roots.items() if root is not None}
         wires = tuple(_Rows(document, roles).all())
@@ -190,7 +266,7 @@ def description(path: Path) -> Description:
 
 def _root(path: Path, level: Mapping[str, Any]) -> Path | None:
     """Return the root file of a level's program; None where there is none, which is reported where it is read."""
-    found = places(path, str(level.get("program", level["name"])))
+    found = places(path, str(level.get("tables", level.get("program", level["name"]))))
     return next((file for file in found if file.is_file()), None)
 
 
@@ -230,14 +306,47 @@ def level_of(entry: CheckedFields) -> LevelSpec:
         Malformed: The entry is no level, or has a bad name.
     """
     feeds = "feed" if "feed" in entry.value else "feeds"
+    name = entry.name("name")
+    program = entry.name("program", name)
+    parameters = _constants(entry)
+    tables = (
+        entry.name("tables", program if parameters else "")
+        if {"tables", "parameters"} & entry.value.keys()
+        else ""
+    )
     return LevelSpec(
-        entry.name("name"),
-        entry.name("program", entry.name("name")),
+        name,
+        name if tables else program,
         tuple(
             Feed(feed.member("into"), feed.name("query"), feed.members("keys"))
             for feed in entry.each(feeds, MOST_LEVELS, ())
         ),
+        tables,
+        parameters,
     )
+
+
+def _constants(entry: CheckedFields) -> tuple[tuple[str, Constant], ...]:
+    """Read the constants of an instance, by name.
+
+    Raises:
+        Malformed: They are none.
+    """
+    given = entry.value.get("parameters", {})
+    pairs = given.items() if isinstance(given, dict) else given
+    if not isinstance(given, dict | list) or len(given) > MOST_LEVELS:
+        raise Malformed("has `parameters` that are none")
+    found: list[tuple[str, Constant]] = []
+    for pair in pairs:
+        name, value = pair if isinstance(pair, list | tuple) and len(pair) == 2 else ("", None)
+        if (
+            not is_identifier(name)
+            or not isinstance(value, bool | int | float | str)
+            or not fits(PARAMETER, value)
+        ):
+            raise Malformed("has `parameters` that are none")
+        found.append((str(name), value))
+    return tuple(found)
 
 
 def wire_of(source: object, target: object) -> Wire:
@@ -263,6 +372,20 @@ def needs_data(system: Description) -> None:
         page = system.review()
         page.wrong(("data",), "the description names no `data`, of which the database would be made")
         raise page.bad(BadDescription)
+
+
+def _check_tables(document: Document) -> None:
+    """Check that a level says once where its tables are."""
+    for at, level in enumerate(document.value["level"]):
+        if "tables" in level and "program" in level:
+            document.wrong(
+                ("level", at, "program"),
+                f"level `{level['name']}` has `tables`, and needs no `program`",
+                "leave `program` out: what is generated for it has the level's name",
+            )
+        for name in level.get("parameters", {}):
+            if not is_identifier(name):
+                document.wrong(("level", at, "parameters", name), f"`{name}` is no constant's name")
 
 
 def _check_parties(document: Document, wires: Sequence[Wire]) -> None:

@@ -37,7 +37,7 @@ from rcsc.compose.proof.system import NoProgramError, loaded_program, transition
 from rcsc.compose.proof.termination import Ending
 from rcsc.front.commands import run
 from rcsc.lang.interpret import Fault, initial
-from rcsc.lang.model import Value, VariableName
+from rcsc.lang.model import Program, Value, VariableName
 from rcsc.lang.restart import Stands
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
@@ -1224,10 +1224,15 @@ def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
     assert len(keys) == len(set(keys))
 
 
+def program_at(path: Path, level: str) -> Program:
+    system = description(path)
+    return loaded_program(path, system, next(spec for spec in system.levels if spec.name == level))[0]
+
+
 def test_a_neighbour_outside_need_not_speak_of_orders() -> None:
     """The gripper drives the hand and senses it; nothing of that is an order that was not recognised."""
     path = Path(__file__).parents[2] / "tables" / "system.toml"
-    program, _ = loaded_program(path, "gripper")
+    program = program_at(path, "gripper")
     found = links(description(path), "gripper", program)
     assert [variable.name for variable in program.variables if variable.name.startswith("to_hand.")]
     assert found.unread == ()
@@ -1244,7 +1249,7 @@ def test_what_two_levels_say_to_each_other_is_named_where_it_is_no_order(
     tmp_path: Path, renamed: str, lacks: str
 ) -> None:
     path = small_system(tmp_path)
-    program, _ = loaded_program(path, "lower")
+    program = program_at(path, "lower")
     variables = tuple(
         replace(variable, name=VariableName(renamed)) if variable.name == "command.inc_command" else variable
         for variable in program.variables

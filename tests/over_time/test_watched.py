@@ -179,7 +179,8 @@ def test_what_a_log_lacks_is_not_looked_at_and_programs_are_read_from_their_sour
     said(capsys)
     log = read(system / ".rcsc-cache" / "door.mcap")
     path = system / "system.toml"
-    assert isinstance(program_of(path, "door"), Program)
+    described = description(path)
+    assert isinstance(program_of(path, described, described.levels[0]), Program)
     every = requirements(path, description(path), monitored=False)
     assert [one.name for one in every["l"]] == ["in_time", "some_time", "rare"]
     assert [(one.name, one.tick) for one in broken_in(log, every)] == [("in_time", 7)]

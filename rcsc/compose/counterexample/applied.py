@@ -20,7 +20,7 @@ from rcsc.base.diagnostics.source import Source
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import AssumptionName, Program, Snapshot, Table
-from rcsc.lang.project import Loaded, load
+from rcsc.lang.project import Loaded, again
 from rcsc.lang.resolve import resolve
 from rcsc.lang.written.changes import spliced
 from rcsc.lang.written.tables import table_of
@@ -94,7 +94,7 @@ class Text:
 
     def __post_init__(self) -> None:
         """Read the files, and prove the table as it is."""
-        self.loaded = load([self.ts.program.file])
+        self.loaded = again(self.ts.program.file, self.ts.program.instance)
         program = resolve(self.loaded.roots[0], self.loaded) if self.loaded.roots else None
         if not isinstance(program, Program) or not self._says(program):
             self.loaded = None

@@ -41,7 +41,7 @@ from rcsc.lang.model import (
     earlier,
     pending,
 )
-from rcsc.lang.project import Loaded, load
+from rcsc.lang.project import Loaded, again
 from rcsc.lang.resolve import resolve
 
 MOST_LINES = 3
@@ -71,9 +71,10 @@ def sayable(place: Environment, slip: Slip) -> bool:
 def resolved(text: str, loaded: Loaded, name: str) -> Property | None:
     """Return a property as the program's own text would have it; None where it is none."""
     root = loaded.roots[0]
-    added = f"{loaded.sources[root].text.rstrip()}\n\n{text}\n"
-    again = load([root], overlay={os.path.realpath(root): added})
-    program = None if again.diagnostics else resolve(again.roots[0], again)
+    file = loaded.file_of(root)
+    added = f"{loaded.sources[file].text.rstrip()}\n\n{text}\n"
+    more = again(file, loaded.instances.get(root), {os.path.realpath(file): added})
+    program = None if more.diagnostics else resolve(more.roots[0], more)
     if not isinstance(program, Program):
         return None
     return next((one for one in program.properties if one.name == name), None)

@@ -44,8 +44,8 @@ from rcsc.compose.proof.termination import Ending
 from rcsc.lang.leaves import spoken_of
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import BEFORE, AssumptionName, Kind, Program
-from rcsc.lang.project import Loaded, load
-from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.lang.project import Loaded
+from rcsc.run.description import BadDescription, Description, LevelSpec, description
 from rcsc.run.links import check_links
 
 SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
@@ -124,7 +124,7 @@ def read_systems(path: Path) -> tuple[dict[str, TransitionSystem], dict[str, Loa
         NoProgramError: The tables of a level cannot be read.
     """
     system = description(path)
-    found = {spec.name: checked(path, spec.program) for spec in system.levels}
+    found = {spec.name: checked(path, system, spec) for spec in system.levels}
     systems = transition_systems_of(system, {name: program for name, (program, _, _) in found.items()})
     loaded = {spec.program: found[spec.name][2] for spec in system.levels}
     return {name: replace(ts, safety=found[name][1]) for name, ts in systems.items()}, loaded
@@ -209,7 +209,7 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
     return replace(mine, above=replace(above, numbered=kept))
 
 
-def checked(path: Path, name: str) -> tuple[Program, Safety, Loaded]:
+def checked(path: Path, system: Description, spec: LevelSpec) -> tuple[Program, Safety, Loaded]:
     """Return the program of a level, the reason why its cycles as nodes agree with its executors, and the files that it was read from.
 
     The two are the same only if every value stays in its range and every operation is defined. That is shown of the program alone,
@@ -221,12 +221,14 @@ def checked(path: Path, name: str) -> tuple[Program, Safety, Loaded]:
     from rcsc.proof.procedures.obligations import Obligations
     from rcsc.proof.solvers.options import Options
 
-    program, loaded = loaded_program(path, name)
+    program, loaded = loaded_program(path, system, spec)
     owed = Obligations(program, Options())
     diagnostics = owed.prove(program.tables)
     for diagnostic in diagnostics:
         if diagnostic.code not in SHOWN_HERE:
-            raise NoProgramError(f"{diagnostic.message}: see `rcsc check {diagnostic.primary.span.file}`")
+            raise NoProgramError(
+                f"{diagnostic.message}: see `{_see(path, spec, diagnostic.primary.span.file)}`"
+            )
     return with_stops(program, owed.stops), _safety(program, owed.stops, diagnostics), loaded
 
 
@@ -247,22 +249,30 @@ def _safety(
     return Safety(tuple(invariant.name for invariant in program.invariants), broken)
 
 
-def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
+def _see(path: Path, spec: LevelSpec, file: str) -> str:
+    """Return the command that shows what is wrong with a level's program: of an instance the file may be in order."""
+    return f"rcsc compile {path}" if spec.tables else f"rcsc check {file}"
+
+
+def loaded_program(path: Path, system: Description, spec: LevelSpec) -> tuple[Program, Loaded]:
     """Return the program of a level, and the files that it was read from.
 
     Raises:
         NoProgramError: The program is missing, or does not resolve.
+        BadDescription: It is an instance with parameters that do not fit it.
     """
     from rcsc.lang.resolve import resolve
 
-    for file in places(path, name):
-        if file.is_file():
-            loaded = load([str(file)])
-            program = resolve(loaded.roots[0], loaded)
-            if isinstance(program, Program) and not loaded.diagnostics:
-                return program, loaded
-            raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
-    raise NoProgramError(f"there is no program `{name}` beside {path}")
+    loaded = system.load(path, spec)
+    if loaded is None:
+        raise NoProgramError(f"there is no program `{spec.source}` beside {path}")
+    program = resolve(loaded.roots[0], loaded)
+    if isinstance(program, Program) and not loaded.diagnostics:
+        return program, loaded
+    if not isinstance(program, Program) and any(found.primary.span.file == str(path) for found in program):
+        raise BadDescription("", program, loaded.sources)
+    file = loaded.file_of(loaded.roots[0])
+    raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
 
 
 def prove_transition_systems(

@@ -17,9 +17,11 @@ array's elements count.
 
 Modules, in the order the data flows: `program` takes the files of a root through the others: `declarations` (units,
 enumerations, constants, variables), `statements`, `procedures` and owners, `tables` (with `precedence`, where lines go before others),
-`levels` (with the order of their tables), `properties` (and requirements over time), `roles`; it has assumptions and invariants itself. `across` takes a file of requirements across levels.
+`levels` (with the order of their tables), `properties` (and requirements over time), `roles`; it has assumptions and invariants itself.
+`instance`: one of several programs of a root, with other constants. `across`: a file of requirements across levels.
 """
 
+from rcsc.lang.resolve.instance import noted
 from rcsc.lang.resolve.program import closure, compile_text, resolve
 
-__all__ = ["closure", "compile_text", "resolve"]
+__all__ = ["closure", "compile_text", "noted", "resolve"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from functools import partial
 
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, sort_key
@@ -26,6 +27,7 @@ from rcsc.lang.project import Loaded, load
 from rcsc.lang.protocol import declared, expanded
 from rcsc.lang.resolve import procedures as calls
 from rcsc.lang.resolve.declarations import Names, requirements
+from rcsc.lang.resolve.instance import instance_of
 from rcsc.lang.resolve.levels import Declarations, level, lines_kept, periods
 from rcsc.lang.resolve.properties import stated
 from rcsc.lang.resolve.roles import offered, restart_of, roles_of
@@ -38,16 +40,29 @@ def resolve(root: str, loaded: Loaded, *, least_first: bool = False) -> Program 
 
     With `least_first` a variable without an initial value starts with the least of its type, as in older files.
     """
+    file, instance = loaded.file_of(root), loaded.instances.get(root)
     files = closure(root, loaded)
     wrong = tuple(d for d in loaded.diagnostics if d.primary.span.file in files)
     if wrong:
         return wrong
-    declarations = [d for file in files for d in loaded.files[file].declarations]
+    declarations = [d for each in files for d in loaded.files[each].declarations]
+    meant = partial(_meant, file, loaded.files[file], least_first=least_first)
+    return (
+        meant(declarations)
+        if instance is None
+        else instance_of(instance, declarations, loaded.files[file], meant)
+    )
+
+
+def _meant(
+    file: str, root: tree.File, declarations: list[tree.Declaration], *, least_first: bool
+) -> Program | tuple[Diagnostic, ...]:
+    """Return the program of these declarations, or its diagnostics."""
     limits: dict[str, int] = {}
     with uncollected():
         while True:
-            resolver = _Resolver(root, limits, least_first)
-            program = resolver.program(declarations, loaded.files[root])
+            resolver = _Resolver(file, limits, least_first)
+            program = resolver.program(declarations, root)
             limits = resolver.scope.limits
             if all(held.limit == limits[key] for key, held in resolver.scope.held.items()):
                 return program
@@ -61,7 +76,8 @@ def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnosti
 
 
 def closure(root: str, loaded: Loaded) -> list[str]:
-    """Return the file and all that it uses, used ones first."""
+    """Return the file of a root and all that it uses, used ones first."""
+    root = loaded.file_of(root)
     order: dict[str, None] = {}
     path = {root: iter(loaded.uses.get(root, ()))}
     while path:

@@ -115,7 +115,7 @@ def stand(path: Path, generated: Path | None = None) -> Stand:
 def _files(path: Path, generated: Path | None) -> tuple[tuple[str, int], ...]:
     """Return every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
     system = _described(path, path.stat().st_mtime_ns if path.is_file() else 0)
-    tried = [place for spec in system.levels for place in places(path, spec.program)]
+    tried = [place for spec in system.levels for place in places(path, spec.source)]
     folders = dict.fromkeys((path.parent, *(place.parent for place in tried)))
     files = [file for folder in folders for end in SOURCES for file in sorted(folder.glob(end))]
     symbols = [generated_files(generated or system.generated, spec.program)[0] for spec in system.levels]
@@ -132,7 +132,7 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
     system = description(path)
     system = replace(system, generated=generated or system.generated)
     signs = signatures(system)
-    programs = {spec.name: program_of(path, spec.program) for spec in system.levels}
+    programs = {spec.name: program_of(path, system, spec) for spec in system.levels}
     edges = {name: _edges(program) for name, program in programs.items()}
     buffers = outside_buffers(system, signs)
     return Stand(

@@ -13,9 +13,8 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import BEFORE, Program, Property, Value
 from rcsc.lang.over_time import Watch
-from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
-from rcsc.run.description import BadDescription, Description, places
+from rcsc.run.description import BadDescription, Description, LevelSpec, places
 from rcsc.run.log.states import LogColumn
 from rcsc.run.signature import Signature, Values
 
@@ -24,14 +23,12 @@ if TYPE_CHECKING:  # reading a log needs its extra; watching values does not
     from rcsc.run.log.read import Log, LoggedLevel
 
 
-def program_of(system: Path, name: str) -> Program:
-    """Return a program of a system, from its source. Raises BadDescription: that is not there, or not in order."""
-    tried = places(system, name)
-    root = next((place for place in tried if place.is_file()), None)
-    if root is None:
-        shown = " nor ".join(f"`{place}`" for place in tried)
+def program_of(path: Path, system: Description, spec: LevelSpec) -> Program:
+    """Return the program of a level, from its source. Raises BadDescription: that is not there, or not in order."""
+    loaded, name = system.load(path, spec), spec.program
+    if loaded is None:
+        shown = " nor ".join(f"`{place}`" for place in places(path, spec.source))
         raise BadDescription(f"the source of program `{name}` is neither {shown}")
-    loaded = load([str(root)])
     program = resolve(loaded.roots[0], loaded) if loaded.roots else ()
     if isinstance(program, Program):
         return program
@@ -96,7 +93,7 @@ def requirements(system: Path, described: Description, *, monitored: bool) -> di
     """
     known: dict[str, tuple[Property, ...]] = {}
     for spec in described.levels:
-        every = program_of(system, spec.program).over_time
+        every = program_of(system, described, spec).over_time
         known[spec.name] = tuple(one for one in every if one.monitored or not monitored)
     return {level: stated for level, stated in known.items() if stated}
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from rcsc.base.host.files.names import file_name, shown
 from rcsc.base.host.files.read import CheckedFields, content, json_of
 from rcsc.run.adopt import Begun
-from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
+from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, LevelSpec, Wire, level_of, wire_of
 from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, restart_written, signature_of
 
 FORMAT = "1"
@@ -177,9 +177,14 @@ def system_facts(system: Description) -> dict[str, str]:
         "format": FORMAT,
         "name": system.name,
         "tick_ms": str(system.tick_ms),
-        "levels": compact([asdict(level) for level in system.levels]),
+        "levels": compact([_level(level) for level in system.levels]),
         "wires": compact([[wire.source, wire.target] for wire in system.wires]),
     }
+
+
+def _level(level: LevelSpec) -> dict[str, object]:
+    """Return a level as a log has it: only an instance says of which tables, with which constants."""
+    return {name: value for name, value in asdict(level).items() if value or name == "feeds"}
 
 
 def system_of(facts: Mapping[str, str], generated: Path, database: Path) -> Description:

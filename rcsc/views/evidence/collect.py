@@ -19,7 +19,7 @@ from rcsc.driver.compile import (
     generated_of,
     planned,
     systems_in,
-    tables_in,
+    with_levels,
 )
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
@@ -62,8 +62,7 @@ def collect(
     Raises:
         BadDescription: A system is not in order.
     """
-    tables = tables_in(settings.paths, tuple(systems_in(settings.paths)))
-    project = proved(replace(settings, paths=tables))
+    project = proved(with_levels(settings, tuple(systems_in(settings.paths))))
     report = project.report()
     if report.failed:
         return Conclusion(report, "no evidence was made: not everything is proved")

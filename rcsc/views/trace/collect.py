@@ -21,7 +21,15 @@ from rcsc.code.emit import TARGETS
 from rcsc.code.emit.plan import Plan
 from rcsc.code.testing.figures import counted
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict
-from rcsc.driver.compile import Generated, code_of, files_of, files_of_system, planned, systems_in, tables_in
+from rcsc.driver.compile import (
+    Generated,
+    code_of,
+    files_of,
+    files_of_system,
+    planned,
+    systems_in,
+    with_levels,
+)
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
@@ -108,7 +116,7 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
     if was is not None:
         wanted = replace(wanted, vectors=was.get("vectors") is not False)
     systems = tuple(systems_in(settings.paths))
-    project = proved(replace(settings, paths=tables_in(settings.paths, systems)))
+    project = proved(with_levels(settings, systems))
     report = project.report()
     if report.failed:
         return Traced(Conclusion(report, "nothing was traced: not everything is proved"))

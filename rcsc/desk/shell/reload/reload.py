@@ -24,7 +24,7 @@ from rcsc.driver.settings import Settings
 from rcsc.lang.hidden import fed_with
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Program, Value
-from rcsc.lang.project import PROJECT_FILE, load, project_root
+from rcsc.lang.project import PROJECT_FILE, again, load, project_root
 from rcsc.lang.resolve import resolve
 from rcsc.proof.solvers.options import Options
 from rcsc.run.description import BadDescription, Description, LevelSpec, places
@@ -122,7 +122,7 @@ def source_of(plant: Origin, spec: LevelSpec) -> Path:
     Raises:
         Refused: It is not where it is looked for.
     """
-    tried = places(plant.path, spec.program)
+    tried = places(plant.path, spec.source)
     source = next((path for path in tried if path.is_file()), None)
     if source is None:
         looked = " and ".join(f"`{path}`" for path in tried)
@@ -145,14 +145,14 @@ def program_of(plant: Origin, spec: LevelSpec, held: KeptSources | None) -> Prog
     """
     source = source_of(plant, spec)
     with laid_out(held or kept(source)) as there:
-        compiled = compile_(_settings(there), plant.system.generated, TARGETS, only_check=True)
+        compiled = compile_(_settings(plant, spec, there), plant.system.generated, TARGETS, only_check=True)
         if compiled.report.failed:
             raise Refused(
                 Code.SHELL_RELOAD,
                 f"`{source}` is not what level `{spec.name}` runs: {_why(compiled.report)}",
                 f"`reload {spec.name}` takes it",
             )
-        return _resolved(there)
+        return _resolved(plant, spec, there)
 
 
 def reload(plant: Origin, spec: LevelSpec, old: RunningLevel, runs: Callable[[], Program | None]) -> Reloaded:
@@ -171,10 +171,10 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel, runs: Callable[[],
     _written(plant, spec, source)
     sources = kept(source)
     with scratch("reload") as place:
-        compiled = compile_(_settings(source), place, TARGETS, only_check=False)
+        compiled = compile_(_settings(plant, spec, source), place, TARGETS, only_check=False)
         if compiled.report.failed:
             raise _refused(spec.name, f"it is not proved: {_why(compiled.report)}")
-        program = _resolved(source)
+        program = _resolved(plant, spec, source)
         try:
             there = replace(plant.system, generated=place)
             sign = signature(generated_files(there.generated, spec.program)[0])
@@ -204,12 +204,15 @@ def _written(plant: Origin, spec: LevelSpec, source: Path) -> None:
         )
 
 
-def _settings(source: Path) -> Settings:
-    return Settings((str(source),), Options())
+def _settings(plant: Origin, spec: LevelSpec, source: Path) -> Settings:
+    instance = plant.system.instance(spec, str(source))
+    if instance is None:
+        return Settings((str(source),), Options())
+    return Settings((instance.root,), Options(), instances={instance.root: instance})
 
 
-def _resolved(source: Path) -> Program:
-    loaded = load([str(source)])
+def _resolved(plant: Origin, spec: LevelSpec, source: Path) -> Program:
+    loaded = again(str(source), plant.system.instance(spec, str(source)))
     program = resolve(loaded.roots[0], loaded)
     assert isinstance(program, Program)  # it was compiled a moment ago
     return program

@@ -114,7 +114,7 @@ class Desk:
         except (BadDescription, OSError):
             return found
         for spec in specs:
-            root = next((each for each in places(self.system, spec.program) if each.is_file()), None)
+            root = next((each for each in places(self.system, spec.source) if each.is_file()), None)
             for file in () if root is None else load([str(root)]).files:
                 found.setdefault(self._name(file), []).append(spec.name)
         return found

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import click
 
-from rcsc.driver.compile import systems_in, tables_in
+from rcsc.driver.compile import systems_in, with_levels
+from rcsc.driver.settings import Settings
 from rcsc.front.commands.shared.graphs import OUT, WrongError, written
 from rcsc.front.commands.shared.options import PATHS
 from rcsc.front.commands.shared.systems import NoSystem, system_path
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded, load
 from rcsc.lang.resolve import resolve
+from rcsc.proof.solvers.options import Options
 from rcsc.run.description import Description, description
 from rcsc.views.trace.names import NamedVariable, named, names_csv, names_json, names_page, names_text
 
@@ -83,7 +85,8 @@ def dictionary(paths: tuple[str, ...]) -> Iterator[NamedVariable]:
     tables = tuple(
         path for path in paths if not any(systems_in((path,)))
     )  # of a system's folder its levels alone
-    loaded = load(tables_in(tables, systems) or (".",))
+    asked = with_levels(Settings(tables, Options()), systems)
+    loaded = load(asked.paths or (".",), instances=asked.instances)
     if loaded.diagnostics:
         raise WrongError(loaded.diagnostics, loaded.sources)
     programs = [resolve(root, loaded) for root in loaded.roots]
