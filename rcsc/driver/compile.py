@@ -51,7 +51,7 @@ def compile_(
     """
     systems = tuple(systems_in(settings.paths))
     folder = out or _folder(systems)
-    project = proved(with_levels(settings, systems))
+    project = proved(with_programs(settings, systems))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
@@ -118,14 +118,18 @@ def tables_in(paths: tuple[str, ...], systems: tuple[Path, ...]) -> tuple[str, .
     return _given(paths, systems, (str(file) for *_, file in _levels(systems)))
 
 
-def with_levels(settings: Settings, systems: tuple[Path, ...]) -> Settings:
+def with_programs(settings: Settings, systems: tuple[Path, ...]) -> Settings:
     """Return the settings with the programs of the systems' levels, instances too, in place of the descriptions."""
     programs: dict[str, Instance | None] = {}
     for system, spec, file in _levels(systems):
         instance = system.instance(spec, str(file))
         programs[str(file) if instance is None else instance.root] = instance
     instances = {root: instance for root, instance in programs.items() if instance is not None}
-    return replace(settings, paths=_given(settings.paths, systems, programs), instances=instances)
+    return replace(
+        settings,
+        paths=_given(settings.paths, systems, programs),
+        instances={**settings.instances, **instances},
+    )
 
 
 def _given(paths: tuple[str, ...], systems: tuple[Path, ...], levels: Iterable[str]) -> tuple[str, ...]:

@@ -137,15 +137,20 @@ def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
             os.path.realpath(ts.level.span.file),
             ts.level.span.start,
             ts.level.span.end,
-            tuple(map(_table, map(ts.table, ts.level.table_names))),
+            () if _set(ts) else tuple(map(_table, map(ts.table, ts.level.table_names))),
             tuple(
                 ((each.word, "", each.name), os.path.realpath(each.span.file))
-                for each in ts.program.properties
+                for each in (() if _set(ts) else ts.program.properties)
             ),
         )
         for name, ts in systems.items()
     )
     return SystemOutline(levels, tuple(promises(systems)))
+
+
+def _set(ts: "TransitionSystem") -> bool:
+    """Return whether a level sets constants: nothing that is proved of it is known of the tables as their file declares them."""
+    return ts.program.instance is not None and bool(ts.program.instance.parameters)
 
 
 def _table(table: "Table") -> TableOutline:

@@ -48,7 +48,7 @@ class Proved:
 
     @property
     def executable(self) -> tuple[tuple[str, ProvedProgram], ...]:
-        """The proved programs that declare a table or a level, each with its root file; a file with instances only where it was asked for."""
+        """The proved programs with a table or a level, each with its root file; a file with instances only where it was asked for."""
         programs = [(proof.root, proof.proved) for proof in self.proofs if proof.proved is not None]
         instances = [one.program.instance for _, one in programs if one.program.instance is not None]
         names, files = {(one.file, one.name) for one in instances}, {one.file for one in instances}

@@ -32,7 +32,7 @@ from rcsc.driver.compile import (
     generated_of,
     planned,
     systems_in,
-    with_levels,
+    with_programs,
 )
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings, TestEffort
@@ -69,7 +69,7 @@ def test(settings: Settings, effort: TestEffort, code: CodeWanted) -> Conclusion
         BadDescription: A system is not in order, or does not fit its programs.
     """
     systems = tuple(systems_in(settings.paths))
-    project = proved(with_levels(settings, systems))
+    project = proved(with_programs(settings, systems))
     report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was tested: not everything is proved")

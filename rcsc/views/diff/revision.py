@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from rcsc.base.host import children
-from rcsc.lang.project import PROJECT_FILE
 
 _REGULAR, _LINK = ("100644", "100755"), "120000"
 
@@ -66,7 +65,7 @@ def lay_out(revision: str, folder: Path) -> str:
 def _is_wanted(path: str) -> bool:
     plain = PurePosixPath(path)
     inside = not plain.is_absolute() and ".." not in plain.parts
-    return inside and (plain.suffix == ".rcs" or plain.name == PROJECT_FILE)
+    return inside and plain.suffix in {".rcs", ".toml"}  # projects and systems are TOML
 
 
 def _link(target: Path, to: str, folder: Path) -> None:

@@ -12,8 +12,9 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Source
 from rcsc.base.host.children import scratch
 from rcsc.lang.model import Program
-from rcsc.lang.project import load
+from rcsc.lang.project import PROJECT_FILE, Instance, load
 from rcsc.lang.resolve import resolve
+from rcsc.run.description import BadDescription, description, places
 from rcsc.views.diff.revision import NotComparedError, lay_out
 
 
@@ -93,7 +94,10 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     there = tuple(path for path in paths if os.path.lexists(path))
     if not there and not asked.may_lack:
         raise NotComparedError(f"there is no file or folder `{asked.name}`")
-    loaded = load(there) if there else None
+    levels = _levels(there)
+    instances = {root: instance for root, (_, instance) in levels.items() if instance is not None}
+    files = tuple(path for path in there if not _is_system(path))
+    loaded = load((*files, *levels), instances=instances) if there else None
     if loaded is None or (asked.may_lack and not loaded.given):
         return Side(asked.name, {}, (), {})
     programs: dict[str, Program] = {}
@@ -101,7 +105,7 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     for root in loaded.roots:
         resolved = resolve(root, loaded)
         if isinstance(resolved, Program):
-            programs[_key(root, there)] = resolved
+            programs[levels[root][0] if root in levels else _key(root, there)] = resolved
         else:
             diagnostics += resolved
     named = {_renamed(name, hidden, shown): source for name, source in loaded.sources.items()}
@@ -112,6 +116,32 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
         tuple(_as_given(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(diagnostics)),
         sources,
     )
+
+
+def _is_system(path: str) -> bool:
+    return path.endswith(".toml") and os.path.basename(path) != PROJECT_FILE
+
+
+def _levels(paths: Sequence[str]) -> dict[str, tuple[str, Instance | None]]:
+    """Return the programs of the systems among the paths, by root: the first level that has it, and what it is an instance of.
+
+    Raises:
+        NotComparedError: A description is not in order.
+    """
+    found: dict[str, tuple[str, Instance | None]] = {}
+    for path in map(Path, filter(_is_system, paths)):
+        try:
+            system = description(path)
+        except BadDescription as error:
+            raise NotComparedError(str(error)) from error
+        for spec in system.levels:
+            file = next((place for place in places(path, spec.source) if place.is_file()), None)
+            if file is not None:
+                instance = system.instance(spec, str(file))
+                found.setdefault(
+                    os.path.normpath(file) if instance is None else instance.root, (spec.name, instance)
+                )
+    return found
 
 
 def _key(root: str, paths: tuple[str, ...]) -> str:

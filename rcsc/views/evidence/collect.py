@@ -19,7 +19,7 @@ from rcsc.driver.compile import (
     generated_of,
     planned,
     systems_in,
-    with_levels,
+    with_programs,
 )
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
@@ -62,7 +62,7 @@ def collect(
     Raises:
         BadDescription: A system is not in order.
     """
-    project = proved(with_levels(settings, tuple(systems_in(settings.paths))))
+    project = proved(with_programs(settings, tuple(systems_in(settings.paths))))
     report = project.report()
     if report.failed:
         return Conclusion(report, "no evidence was made: not everything is proved")

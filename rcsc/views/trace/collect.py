@@ -28,7 +28,7 @@ from rcsc.driver.compile import (
     files_of_system,
     planned,
     systems_in,
-    with_levels,
+    with_programs,
 )
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
@@ -116,7 +116,7 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
     if was is not None:
         wanted = replace(wanted, vectors=was.get("vectors") is not False)
     systems = tuple(systems_in(settings.paths))
-    project = proved(with_levels(settings, systems))
+    project = proved(with_programs(settings, systems))
     report = project.report()
     if report.failed:
         return Traced(Conclusion(report, "nothing was traced: not everything is proved"))

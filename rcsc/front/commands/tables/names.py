@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rcsc.driver.compile import systems_in, with_levels
+from rcsc.driver.compile import systems_in, with_programs
 from rcsc.driver.settings import Settings
 from rcsc.front.commands.shared.graphs import OUT, WrongError, written
 from rcsc.front.commands.shared.options import PATHS
@@ -85,7 +85,7 @@ def dictionary(paths: tuple[str, ...]) -> Iterator[NamedVariable]:
     tables = tuple(
         path for path in paths if not any(systems_in((path,)))
     )  # of a system's folder its levels alone
-    asked = with_levels(Settings(tables, Options()), systems)
+    asked = with_programs(Settings(tables, Options()), systems)
     loaded = load(asked.paths or (".",), instances=asked.instances)
     if loaded.diagnostics:
         raise WrongError(loaded.diagnostics, loaded.sources)

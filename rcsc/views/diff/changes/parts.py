@@ -205,7 +205,7 @@ _COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
     "levels": ("level", {"preprocess": (), "postprocess": ()}),
 }
 """What the members of a program's field are called, and which of their fields a comparison of their own looks at."""
-_UNSEEN = {"name", "file", "own_tables"}
+_UNSEEN = {"name", "file", "own_tables", "instance"}
 """Fields of a program that mean nothing to it: where it stands, and which file declares what."""
 _UNNAMED = {"roles", "restart"}
 """Fields whose parts have no name of their own; they are compared by themselves."""
