@@ -74,7 +74,10 @@ def _plan(program: Program, root: str, *, proved: bool) -> Plan:
         [p.span.file for p in program.procedures] + [a.span.file for a in program.assumptions]
     )
     files = {file: _seen(file, root) for file in declared if file}
-    return Plan(program, _seen(program.file, root), tables, monitored, proved, places=places, files=files)
+    source = _seen(program.file, root)
+    if program.instance is not None:
+        source = f"{source} ({program.name})"
+    return Plan(program, source, tables, monitored, proved, places=places, files=files)
 
 
 def _seen(file: str, root: str) -> str:

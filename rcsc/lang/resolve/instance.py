@@ -197,13 +197,9 @@ class _Made:
         place = self._guilty(
             lambda made: not isinstance(made, Program) and any(one.code is found.code for one in made)
         )
-        message = f"level `{self.instance.name}`: {found.message}"
-        return replace(
-            found,
-            message=message,
-            primary=Label(place),
-            related=(Label(found.primary.span, "it is here"), *found.related),
-        )
+        message, there = f"level `{self.instance.name}`: {found.message}", found.primary.span
+        here = () if there.file == place.file else (Label(there, "it is here"),)
+        return replace(found, message=message, primary=Label(place), related=(*here, *found.related))
 
     def _guilty(self, does: Callable[[Resolved], bool]) -> Span:
         """Return the place of the one parameter that alone does it; of the whole instance where there is no such."""
