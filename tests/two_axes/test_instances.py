@@ -1,5 +1,6 @@
 """One file of tables run as several levels, with constants of their own."""
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -40,6 +41,7 @@ table t {
 level one { table t }
 """
 NOWHERE = Span("system.toml", 0, 0)
+TEMPLATE = Path(__file__).parents[2] / "rcsc/front/commands/templates/system"
 
 
 def instance(
@@ -157,6 +159,29 @@ level one { table t }
 
 
 # --- the system ---
+
+
+def test_instances_may_command_instances_where_rows_say_whom(tmp_path: Path) -> None:
+    """The template's system twice, but for its plant: two supervisors, each with an axis."""
+    shutil.copytree(TEMPLATE, tmp_path / "twice")
+    path = tmp_path / "twice" / "system.toml"
+    levels = {"s1": "supervisor", "s2": "supervisor", "a1": "axis", "a2": "axis"}
+    rows = [
+        f'"s{at}.to_axis" = "a{at}.supervisor"\n"a{at}.to_supervisor" = "s{at}.from_axis"\n'
+        f'"person.job{at}" = "s{at}.person"\n"s{at}.to_person" = "person.done{at}"'
+        for at in (1, 2)
+    ]
+    text = "".join(f'[[level]]\nname = "{name}"\ntables = "{of}"\n' for name, of in levels.items())
+    head = 'name = "twice"\ngenerated = "g"\ntick_ms = 40\n'
+    path.write_text(head + text + "[buffers]\n" + "\n".join(rows), encoding="utf-8")
+    systems = transition_systems(path)
+    assert [[one.name for one in ts.links.below] for ts in systems.values()] == [["a1"], ["a2"], [], []]
+    assert [ts.links.above and ts.links.above.name for ts in systems.values()] == [
+        "person",
+        "person",
+        "s1",
+        "s2",
+    ]
 
 
 def c_of(system: Path, level: str) -> str:
