@@ -466,7 +466,9 @@ def test_the_guide_has_every_key_of_a_description(repo: Path) -> None:
 
 def test_the_example_of_the_guide_is_taken(repo: Path, tmp_path: Path) -> None:
     text = (repo / "tables" / "system.md").read_text(encoding="utf-8")
-    whole, model = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
+    whole, readers, levels, model = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
+    axes = (repo / "tests/data/two_axes/system.toml").read_text(encoding="utf-8")
+    assert {*levels.splitlines(), readers.splitlines()[0]} <= set(axes.splitlines())
     (tmp_path / "rcsc.toml").write_text("", encoding="utf-8")
     buffers = '"base.lateral" = "drive.lateral_mm"\n"base.contact" = "supervisor.contact"\n"base.beacon" = "supervisor.beacon_seen"\n'
     (tmp_path / "system.toml").write_text(
