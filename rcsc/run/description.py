@@ -606,11 +606,26 @@ class _Rows:
         theirs = getattr(self.roles.get(other, Neighbours()), word)
         does = f"{word} {', '.join(f'`{name}`' for name in theirs)}" if theirs else f"{word} nobody"
         wanted = says.split("`")[1]
+        if other not in self.roles:
+            tried = " and ".join(
+                f"`{place}`" for place in places(Path(self.document.name), self._tables(other))
+            )
+            self.document.wrong(
+                ("level", at, "name"),
+                f"{says}, and the tables of `{other}` are not there",
+                f"looked for {tried}",
+            )
+            return
         self.document.wrong(
             ("level", at, "name"),
             f"{says}, and `{other}` {does}",
             f"write `{word} {wanted} : LINK` in the tables of `{other}`, or connect the two in `[buffers]`",
         )
+
+    def _tables(self, name: str) -> str:
+        """Return the stem of the file that a level's tables are in."""
+        level = next(level for level in self.document.value["level"] if level["name"] == name)
+        return str(level.get("tables", level.get("program", name)))
 
     def _outside(self, at: int, row: tuple[str, str], levels: list[str]) -> None:
         """Add a row to or from a party outside, unless the level's end is written."""

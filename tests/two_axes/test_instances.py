@@ -262,6 +262,7 @@ def test_no_verdict_on_the_declared_values_is_taken_for_an_instance(
         ("fast = 500", "fast = [5]", "fast = [5]"),
         (FAST, f'{FAST}\nprogram = "node"', 'program = "node"'),
         ("fast = 500", '"a b" = 500', '"a b" = 500'),
+        ('"node"\nparameters', '"nod"\nparameters', 'name = "lead"'),
     ],
 )
 def test_what_does_not_fit_is_told_at_its_place_in_the_description(

@@ -66,6 +66,24 @@ def test_a_list_of_one_says_what_the_name_alone_says(axes: Path) -> None:
     assert description(axes).wires == wires
 
 
+def test_a_plant_of_a_model_is_bound_to_any_reader_and_to_the_one_output(axes: Path) -> None:
+    edit_file(
+        axes,
+        ('"left.speed_mm_s" = "base.left_speed"', '"left.speed_mm_s" = ["base.left_speed", "base.shown"]'),
+    )
+    text = axes.read_text(encoding="utf-8").partition("[plant]")[0]
+    model = """[plant.mujoco]
+model = "two.xml"
+sensors = { "base.estop" = { value = false } }
+actuators = { "base.left_speed" = { actuator = "left" }, "base.shown" = { ignore = true } }
+"""
+    axes.write_text(text + model, encoding="utf-8")
+    assert [spec.name for spec in description(axes).plants] == ["mujoco"]
+    axes.write_text(text + model.replace("base.shown", "base.showed"), encoding="utf-8")
+    [(message, _)] = refused(axes)
+    assert "`base.showed` is no end of a buffer that goes outside" in message
+
+
 @pytest.mark.parametrize(
     ("row", "wrong", "at"),
     [
