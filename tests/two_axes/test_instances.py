@@ -11,6 +11,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.driver.compile import compile_, compile_system, with_programs
+from rcsc.driver.outline import outline
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Settings
 from rcsc.front.commands import run as rcsc
@@ -252,6 +253,13 @@ def test_no_verdict_on_the_declared_values_is_taken_for_an_instance(
     said = out + err
     assert "| lead.target_mm | 6" in said or "table `move`: not proved: some line matches" in said
     assert ("closes the gap" if command == "prove" else "with near = 7") in said
+
+
+def test_what_is_proved_of_other_constants_is_not_said_of_the_file(axes: Path) -> None:
+    """`rcsc check` tells of the file's tables what is proved of a level that keeps the declared values."""
+    levels = {level.name: level for level in outline(transition_systems(axes)).levels}
+    assert [len(levels[name].tables) for name in ("lead", "left", "right")] == [2, 2, 0]
+    assert [bool(levels[name].properties) for name in ("lead", "left", "right")] == [True, True, False]
 
 
 @pytest.mark.parametrize(
