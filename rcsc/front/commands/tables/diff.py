@@ -67,7 +67,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 ) -> int:  # fmt: skip
     """Show the inputs for which another line, effect or fault follows in B than in A, and prove that there are no others.
 
-    A and B are files, folders, descriptions of systems (TOML), or `REV:path` as git has it. Effects are compared by meaning: what procedures, command and
+    A and B are files, folders, descriptions of systems (TOML), or `REV:path` as git has it.
+    Effects are compared by meaning: what procedures, command and
     status leave behind, whatever their text. Lines that are only renamed, split or renumbered are shown apart and change nothing.
     For a level the steps of its state graph are compared: which are new, which are gone.
     """
