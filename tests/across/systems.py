@@ -50,7 +50,16 @@ def drawn(seed: int) -> Drawn:
     tick = 'name = "drawn"\ngenerated = "generated"\ntick_ms = 10\nrequirements = "requirements.rcs"\n'
     levels = "".join(f'[[level]]\nname = "{name}"\n' for name in names)
     files["system.toml"] = tick + levels + "[buffers]\n" + "\n".join(wires) + "\n"
-    files["requirements.rcs"] = "\n".join(_requirements(random, names)) + "\n"
+    files["requirements.rcs"] = (
+        "\n".join(
+            _requirements(
+                random,
+                names,
+                {name: files[f"{name}.rcs"].partition("input y")[2].partition("state")[0] for name in names},
+            )
+        )
+        + "\n"
+    )
     return Drawn(names, files)
 
 
@@ -78,13 +87,13 @@ def _level(random: Random, name: str) -> str:
     )
 
 
-def _requirements(random: Random, names: tuple[str, ...]) -> Iterator[str]:
+def _requirements(random: Random, names: tuple[str, ...], files: Mapping[str, str]) -> Iterator[str]:
     def atom() -> str:
         name = random.choice(names)
         party = f"plant.y_{name}"
         return random.choice(
             (f"{name}.o", f"{name}.n = {random.randrange(3)}", f"{name}.x", f"{name}.n > {random.randrange(2)}", f"not {name}.o",
-             f"was {name}.o", f"({party} = {party})")
+             f"was {name}.o", party if "bool" in files[name] else f"{name}.o")
         )  # fmt: skip
 
     for at in range(4):
@@ -208,20 +217,20 @@ class Running:
         self.system.tick = tick
         return self.system
 
-    def _seen(self, admitted: Mapping[str, tuple[Any, ...]]) -> dict[str, Any]:
+    def _seen(self, admitted: Mapping[str, tuple[Any, ...]], given: Mapping[str, Any]) -> dict[str, Any]:
         seen = dict[str, Any]()
         for level in self.system.levels:
             x, y = admitted[level.name]
             of = {"x": x, "y": y, "n": level.value("n"), "o": level.value("o")}
             seen |= {f"{level.name}.{leaf}": value for leaf, value in of.items()}
-            seen[f"plant.y_{level.name}"] = y
+            seen[f"plant.y_{level.name}"] = given[level.name]
         return seen
 
     def _step(
         self, kept: Any, given: dict[str, Any], anew: dict[str, bool], watch: Watch | None, stated: Property
     ) -> tuple[Any, Any] | None:
-        system, (_, _, admitted, states, tick) = self._at(kept), kept
-        before = self._seen(admitted)
+        system, (_, held, admitted, states, tick) = self._at(kept), kept
+        before = self._seen(admitted, {name: held.get(f"plant.y_{name}", (0,))[0] for name in given})
         for name, value in given.items():
             system.buffers.publish(f"plant.y_{name}", (value,))
         for name, begins in anew.items():
@@ -234,7 +243,7 @@ class Running:
         for level in system.levels:
             if tick * 10 % level.level.period_ms == 0 and not level.fault:
                 now[level.name] = self._inputs(level.name)
-        after = self._seen(now)
+        after = self._seen(now, given)
         if watch is not None:
             watch.state = dict(states)
             if not watch.keeps(before, after):

@@ -6,6 +6,7 @@ obligation: one about matching by the interpreter's fault, any other by its own 
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias, assert_never
 
@@ -199,7 +200,7 @@ def _step(
     answers: tuple[ExternAnswer, ...],
 ) -> CycleRun:
     after = outcome.snapshot
-    chosen = ts.table_of(after)
+    chosen = _chosen(ts, after, before)
     line = "" if outcome.line is None else str(outcome.line)
     matched: tuple[str, ...] = () if outcome.line is None else (line,)
     if outcome.fault is Fault.SEVERAL_LINES:
@@ -220,6 +221,14 @@ def _step(
         if ts.level.stages
         else replace(step, failed=(*step.failed, *_also_failed(ts, step)))
     )
+
+
+def _chosen(ts: TransitionSystem, *states: Snapshot) -> str:
+    """Return the table of the first of these states that selects one: a refused input may select none."""
+    for state in states:
+        with suppress(KeyError):
+            return ts.table_of(state)
+    return str(ts.level.table_names[-1])
 
 
 def _staged(ts: TransitionSystem, step: CycleRun) -> CycleRun:

@@ -8,11 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from rcsc.compose.contract.given import refused
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
 from rcsc.compose.exact.circuit import Circuit
 from rcsc.compose.exact.explicit import Run
 from rcsc.compose.together.product import Tick, Together
 from rcsc.lang.interpret import UNDEFINED, Fault, holds, initial
+from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Property, Value, earlier, value_of_key
 from rcsc.lang.over_time.run import Watch
 from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
@@ -30,12 +32,14 @@ class Playing:
         now: The leaves of each level; its inputs as it last took them, admitted or not.
         found: The states of the monitors of its own requirements; None where they begin.
         admitted: The inputs of each as it last took them: what is refused is not taken.
+        given: What stands in the buffers of the parties outside.
     """
 
     ts: Together
     now: dict[str, State] = field(init=False)
     found: dict[str, Mapping[str, Value] | None] = field(init=False)
     admitted: dict[str, State] = field(init=False)
+    given: State = field(init=False)
 
     def __post_init__(self) -> None:
         self.now = {name: dict(initial(member.program)) for name, member in self.ts.members.items()}
@@ -44,6 +48,8 @@ class Playing:
             name: {leaf: self.now[name][leaf] for leaf in member.inputs}
             for name, member in self.ts.members.items()
         }
+        first = {str(v.name): v.initial for v in self.ts.program.variables}
+        self.given = {name: first[name] for name in self.ts.given}
 
     @property
     def state(self) -> State:
@@ -53,7 +59,7 @@ class Playing:
             for name, now in self.now.items()
             for leaf, value in {**now, **self.admitted[name]}.items()
         }
-        return state | {mine: state[same] for mine, same in self.ts.aliases if same in state}
+        return state | self.given | {mine: state[same] for mine, same in self.ts.shown.items()}
 
     def tick(self, asked: Mapping[str, "Asked"]) -> dict[str, CycleRun]:
         """Run a tick: each level takes what the tick before left."""
@@ -77,7 +83,7 @@ class Playing:
         if asked.anew:
             before, self.found[name] = begun_anew(self.ts, name, before, taken), None
         if asked.refused:
-            leaf = member.refusable[0]
+            leaf = _refused(member)
             taken[leaf] = refused(member.program.variable(leaf))
         step = one_cycle(member, before, taken, (), self.found[name])
         self.now[name], self.found[name] = dict(step.after), step.left
@@ -95,6 +101,12 @@ class Asked:
     refused: bool
     taken: Mapping[str, Value]
     first: bool
+
+
+def _refused(member: TransitionSystem) -> str:
+    """Return the input that is refused in runs: none that selects a table, where there is another."""
+    selects = {str(name) for selector in member.level.selectors for name in read_by(selector)}
+    return min(member.refusable, key=lambda leaf: leaf in selects)
 
 
 def begun_anew(ts: Together, name: str, stood: State, taken: State) -> State:
@@ -133,6 +145,7 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> Ticks | N
         assert isinstance(tick, Tick)
         before = playing.state
         ticks.append(playing.tick({name: _asked(ts, tick, name, given, number) for name in ts.members}))
+        playing.given |= _told({leaf: tick.after[leaf] for leaf in ts.given}, given)
         after = playing.state
         if any(step.ends_the_run for step in ticks[-1].values()):
             return None
@@ -153,13 +166,16 @@ def _keeps(stated: Property, watch: Watch | None, before: State, after: State) -
 
 def _asked(ts: Together, tick: Tick, name: str, given: Mapping[str, int], number: int) -> Asked:
     """Read what befalls a level in a tick; what the run does not tell stays as it is, and does not happen."""
-    taken = {
-        leaf: value_of_key(node.kind, given[node.name])
-        for leaf, node in tick.takes[name].items()
-        if node.name in given
-    }
+    taken = _told(tick.takes[name], given)
     anew, is_refused = (_happens(of[name], given) for of in (tick.restarts, tick.refuses))
     return Asked(number % ts.periods[name] == 0, anew, is_refused, taken, first=number == 0)
+
+
+def _told(leaves: Mapping[str, Node], given: Mapping[str, int]) -> State:
+    """Return the values of these variables, of those that a run tells."""
+    return {
+        leaf: value_of_key(node.kind, given[node.name]) for leaf, node in leaves.items() if node.name in given
+    }
 
 
 def _happens(node: Node, given: Mapping[str, int]) -> bool:

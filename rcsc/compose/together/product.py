@@ -12,10 +12,10 @@ Two timings:
 
 Restarts are part of both: any level may begin anew before any cycle of it (`run.adopt`). As scheduled its inputs are what stands in its
 buffers, and its orders go on from those that it gave last; else as its own proof has it. What stands outside gives any values, as
-one level's environment does, refused ones too; a party's output is one value in a tick, whoever reads it.
+one level's environment does, refused ones too; as scheduled a party's output is one value in a tick, whoever reads it.
 
-What a requirement reads of a level is what the level has after the tick; an input, as the level last took it: a refused value is none. A
-variable of a party outside is what the first level at the other end of its buffer took, or gave, last.
+What a requirement reads of a level is what the level has after the tick; an input, as the level last took it: a refused value is none.
+What a party outside gives is what stands in its buffer in that tick, and what it takes, what the level gave last.
 
 Trusted is this module, as `contract.transition` is; that every cycle goes on, and that what stands outside keeps to its contract, is
 proved of each level alone and taken from there.
@@ -30,7 +30,7 @@ from rcsc.compose.contract.environment import Links, leaves_under
 from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, kept, monitors
 from rcsc.lang.leaves import spoken_of
-from rcsc.lang.model import BEFORE, Bool, Int, Level, OneTable, Program, Property, Scalar, TableName
+from rcsc.lang.model import BEFORE, Bool, Int, Kind, Level, OneTable, Program, Property, Scalar, TableName
 from rcsc.lang.operator_table import Op
 from rcsc.lang.restart import After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic import values
@@ -130,27 +130,34 @@ class Together(TransitionSystem):
         return lcm(*(self.periods[name] for name in self.members))
 
     @property
-    def aliases(self) -> Iterator[tuple[str, str]]:
-        """Yield each variable of a party outside, with the leaf of a level that is the same."""
-        known = {str(v.name) for v in self.program.variables if v.name.partition(".")[0] not in self.members}
-        ends = dict(
-            reversed([(mine, same) for mine, same in self._ends if same.partition(".")[0] in self.members])
-        )
-        yield from ((mine, same) for mine, same in ends.items() if mine in known)
+    def given(self) -> dict[str, Scalar]:
+        """What parties outside give to these levels, with its type."""
+        read = {
+            f"{source.party}.{source.leaf}"
+            for end, source in self.sources.items()
+            if end.partition(".")[0] in self.members
+        }
+        return {
+            str(v.name): v.type for v in self.program.variables if v.kind is Kind.INPUT and v.name in read
+        }
 
     @property
-    def _ends(self) -> Iterator[tuple[str, str]]:
-        """Yield both ends of each buffer."""
-        for end, source in self.sources.items():
-            yield f"{source.party}.{source.leaf}", end
-            yield end, f"{source.party}.{source.leaf}"
+    def shown(self) -> dict[str, str]:
+        """What parties outside take of these levels, with the leaf that it is."""
+        return {
+            end: f"{source.party}.{source.leaf}"
+            for end, source in self.sources.items()
+            if source.party in self.members and end.partition(".")[0] not in self.systems
+        }
 
     def initial(self) -> Leaves:
         """Return the state before the first tick."""
         start = {
             f"{name}.{leaf}": node for name, ts in self.members.items() for leaf, node in ts.initial().items()
         }
-        start |= {name: start[same] for name, same in self.aliases if same in start}
+        start |= {name: start[same] for name, same in self.shown.items()}
+        first = {str(v.name): v.initial for v in self.program.variables}
+        start |= {name: values.constant(kind, first[name]) for name, kind in self.given.items()}
         if NOW in self.kinds:
             start[NOW] = values.constant(self.kinds[NOW], 0)
         return {**start, **first_ghosts(self.program)}
@@ -168,7 +175,7 @@ class Together(TransitionSystem):
         return self._tick(before, suffix, first=False)
 
     def _tick(self, before: Leaves, suffix: str, *, first: bool) -> Tick:
-        cycles, outside = dict[str, Cycle](), dict[tuple[Source, Scalar], Node]()
+        cycles = dict[str, Cycle]()
         due, restarts, takes = dict[str, Node](), dict[str, Node](), dict[str, Leaves]()
         after = dict(before)
         for name, ts in self.members.items():
@@ -176,7 +183,7 @@ class Together(TransitionSystem):
             restarts[name] = FALSE
             if self.restarting and not first:  # before a cycle of it: what it gave last stands until then
                 restarts[name] = values.variable(f"{name} begins anew{suffix}", Bool())
-            taken = self._taken(name, before, outside, suffix, first=first)
+            taken = self._taken(name, before, suffix, first=first)
             takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in self.wired}
             stood = {leaf: before[f"{name}.{leaf}"] for leaf in ts.kinds}
             start = _or(restarts[name], self._anew(name, stood, taken, suffix), stood)
@@ -185,8 +192,8 @@ class Together(TransitionSystem):
             nothing = values.both(restarts[name], cycles[name].untaken)  # taken, since it began anew
             ended |= {leaf: values.choice(nothing, stood[leaf], ended[leaf]) for leaf in ts.inputs}
             after |= {f"{name}.{leaf}": node for leaf, node in ended.items()}
-        for name, same in self.aliases:
-            after[name] = after[same]
+        after |= {name: after[same] for name, same in self.shown.items()}
+        after |= {name: values.variable(f"{name}{suffix}", kind) for name, kind in self.given.items()}
         if NOW in self.kinds:
             after[NOW] = self._counted(before[NOW])
         after |= ghosts_after(self.program, before, after, Refusals())
@@ -247,34 +254,21 @@ class Together(TransitionSystem):
         later = values.arithmetic(Op.ADD, (now, values.constant(Int(1, 1), 1)), following)
         return values.arithmetic(Op.MOD, (later, values.constant(Int(many, many), many)), now.kind)
 
-    def _taken(
-        self,
-        name: str,
-        before: Leaves,
-        outside: dict[tuple[Source, Scalar], Node],
-        suffix: str,
-        *,
-        first: bool,
-    ) -> Leaves:
-        """Return the inputs that a level takes: of the other levels what they gave last, of the parties outside one value each."""
-        ts, taken = self.members[name], {}
-        wired = self.wired
+    def _taken(self, name: str, before: Leaves, suffix: str, *, first: bool) -> Leaves:
+        """Return the inputs that a level takes: of other levels what they gave last, of parties outside what stands in their buffers.
+
+        Where that may be late, or its type is another one for this level, it is any value.
+        """
+        ts, taken, wired, given = self.members[name], {}, self.wired, self.given
         for leaf in ts.inputs:
             own = f"{name}.{leaf}"
-            source, kind = self.sources.get(own), ts.kinds[leaf]
             if own in wired:
                 taken[leaf] = before[own if first else wired[own]]
                 continue
-            if source is None or source.party in self.systems:
-                taken[leaf] = values.variable(f"{own}{suffix}", kind)
-                continue
-            if (source, kind) not in outside:
-                given = f"{source.party}.{source.leaf}{suffix}"
-                taken_already = any(
-                    known == source for known, _ in outside
-                )  # of another type: any other value
-                outside[source, kind] = values.variable(f"{own}{suffix}" if taken_already else given, kind)
-            taken[leaf] = outside[source, kind]
+            source, kind = self.sources.get(own), ts.kinds[leaf]
+            stands = "" if source is None else f"{source.party}.{source.leaf}"
+            same = self.timing is Timing.SCHEDULED and given.get(stands) == kind
+            taken[leaf] = values.variable(f"{stands if same else own}{suffix}", kind)
         return taken
 
 

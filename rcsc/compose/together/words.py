@@ -46,7 +46,7 @@ def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> t
             system = description(path)
             if system.requirements is None or os.path.realpath(system.requirements) != real:
                 continue
-            programs = {spec.name: loaded_program(path, spec.program)[0] for spec in system.levels}
+            programs = {spec.name: loaded_program(path, system, spec)[0] for spec in system.levels}
         except (BadDescription, NoProgramError):
             continue
         found = resolve_across(root, loaded, parties(system, programs), system.tick_ms)

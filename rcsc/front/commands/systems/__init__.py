@@ -10,8 +10,8 @@ Each module of a command has it under the name `command`. Without a description 
 Nothing here is trusted for a verdict. What it costs: what moves a model imports MuJoCo, and what reads or writes logs
 their package; each says which extra brings it.
 
-Modules: `prove` says again what is known of the levels together, else `proving` proves them, `explained` says what
-it does not prove, `covering` what requirements speak of and `across` how those across levels stand; `run` runs a system with its plant, `campaign` many
-episodes of it, `shell` puts a system under somebody's hands; `log` says what a recorded run did and `replay` runs it
-again; `db` is about the cell's database.
+Modules: `prove` says again what is known of the levels together, else `proving` proves them, `explained` says what it
+does not prove, `covering` what requirements speak of and `across` how those across levels stand; `run` runs a system
+with its plant, `campaign` many episodes of it, `shell` puts a system under somebody's hands; `log` says what a
+recorded run did and `replay` runs it again; `db` is about the cell's database.
 """
