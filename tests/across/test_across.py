@@ -321,3 +321,15 @@ def test_what_rests_on_a_level_that_is_not_proved_says_so(tmp_path: Path, rcsc: 
     status, out, _ = rcsc("prove", path, "--no-cache")
     assert status == 1
     assert "rests on" in out.splitlines()[1]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("template", ["system", "mujoco"])
+def test_what_the_templates_require_is_proved(
+    tmp_path: Path, rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch, template: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert rcsc("new", "robot", "--template", template)[0] == 0
+    status, out, _ = rcsc("prove", "robot/system.toml", "--no-cache")
+    assert status == 0
+    assert [line.split()[1:3] for line in out.splitlines()[1:4]] == [["proved", "as"]] * 3
