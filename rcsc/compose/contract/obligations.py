@@ -306,11 +306,12 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
         once = values.follows(command_stays(ts, cycle), values.negation(rises))
         yield Obligation(Sort.ONCE, "", FLAG, once)
+        again = ts.middle(cycle.after, " again", cycle.taken)[FLAG]
         for at in cycle.tables:
             overlooking = _overlooking(ts, cycle, at)
             ends = bool(at.table.stops) or asks(ts.program) or ts.program.roles is not None
             if overlooking or (overlooking is not None and ends):
-                yield _answered(ts, cycle, at, overlooking)
+                yield _answered(cycle, at, overlooking, again)
     for variable in ts.program.variables:
         if variable.deferred_until is not None:
             untouched = values.equal(cycle.after[variable.name], cycle.prepared[variable.name])
@@ -466,13 +467,12 @@ def looks_for(leaf: str, line: Line) -> bool:
     return any(leaf in map(str, read_by(condition)) for condition in line.conditions)
 
 
-def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Obligation:
+def _answered(cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...], again: Node) -> Obligation:
     """State that a new command's flag stays up over each line that ignores it, and over each cycle that ends early.
 
-    If it is down when the level sees the same inputs again, no line will answer the command, and the report of this
+    If it is down when the level sees the same inputs `again`, no line will answer the command, and the report of this
     line is taken for the answer.
     """
-    again = ts.admitting().cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
     missed = values.any_of(overlooking)
     passed = values.all_of((at.chosen, values.negation(at.several()), missed))
     passed = values.either(passed, values.both(at.selected, cycle.interrupted))

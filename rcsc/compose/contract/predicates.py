@@ -106,30 +106,25 @@ class Predicate:
 
 def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
     """Find the leaves whose values before a cycle can influence the nodes, in this cycle or a later one."""
+    owed = list(obligations)
+    reads = values.each_reads([*owed, *cycle.after.values()])
+    of_leaf = dict(zip(cycle.after, reads[len(owed) :], strict=True))
     leaves: set[str] = set()
-    waiting = [name for name in values.variables(obligations) if name in cycle.before]
-    while waiting:
-        name = waiting.pop()
-        if name not in leaves:
-            leaves.add(name)
-            waiting += [
-                variable for variable in values.variables([cycle.after[name]]) if variable in cycle.before
-            ]
+    waiting = frozenset[str]().union(*reads[: len(owed)])
+    while new := (waiting & cycle.before.keys()) - leaves:
+        leaves |= new
+        waiting = frozenset[str]().union(*(of_leaf[name] for name in new))
     return frozenset(leaves)
 
 
-def predicates(
-    ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
-) -> tuple[Predicate, ...]:
+def predicates(ts: TransitionSystem, inside: frozenset[str], closely: int = 0) -> tuple[Predicate, ...]:
     """Choose the predicates in the cone of the obligations, in declared order.
 
     Args:
         ts: The level.
-        cycle: From any state.
-        obligations: The conditions to be proved.
+        inside: The cone.
         closely: From 1 on, those on which procedures branch come after the others.
     """
-    inside = cone(cycle, obligations)
     program, kinds = ts.program, ts.kinds
     read = _read(ts)
     computed = {leaf: module for leaf, module in _computed(ts) if leaf in read}

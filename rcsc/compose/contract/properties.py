@@ -142,21 +142,21 @@ def every_predicate(
 
     Those of a lower `closely` come first, in the same order, because clauses name predicates by position.
     """
-    wanted = list(obligations)
-    first = predicates(ts, cycle, wanted)
+    inside = cone(cycle, obligations)
+    first = predicates(ts, inside)
     stated = (
-        _stated_predicates(ts, cone(cycle, wanted), {predicate.name for predicate in first})
+        _stated_predicates(ts, inside, {predicate.name for predicate in first})
         if _stated_conditions(ts)
         else ()
     )
     there = {predicate.name for predicate in (*first, *stated)}
-    answers = (one for one in _of_answers(ts, cycle, cone(cycle, wanted)) if one.name not in there)
+    answers = (one for one in _of_answers(ts, cycle, inside) if one.name not in there)
     chosen = (*first, *stated, *answers)
     if closely:
         there = {predicate.name for predicate in chosen}
-        closer = predicates(ts, cycle, wanted, closely)
+        closer = predicates(ts, inside, closely)
         chosen = (*chosen, *(predicate for predicate in closer if predicate.name not in there))
-    return (*chosen, *_side_by_side(ts, cone(cycle, wanted))) if closely == CLOSELY else chosen
+    return (*chosen, *_side_by_side(ts, inside)) if closely == CLOSELY else chosen
 
 
 def _side_by_side(ts: TransitionSystem, inside: frozenset[str]) -> Iterator[Predicate]:

@@ -7,6 +7,7 @@ selected table and postprocess, exactly as `interpret.cycle` does; what the envi
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import NamedTuple
 
 from rcsc.compose.contract.environment import Below, Links
 from rcsc.compose.contract.facts import believed, outside_values
@@ -170,6 +171,17 @@ class Cycle:
         looks_back = frozenset(str(earlier(name)) for name in inputs)
         before = self.before.get(REFUSED, FALSE)
         return Refusals(self.untaken, self.strange, before, looks_back, self.taken, suffix)
+
+
+class _Begun(NamedTuple):
+    """A cycle up to the table that runs last: parts of `Cycle`, and the condition that those before it matched one line each."""
+
+    run: Run
+    settled: Leaves
+    stages: tuple[TableAt, ...]
+    seen: tuple[Leaves, ...]
+    middle: Leaves
+    matched: Node
 
 
 def _matches(run: Run, line: Line) -> Node:
@@ -467,22 +479,11 @@ class TransitionSystem:
         """Return a cycle in which no input is refused."""
         if taken is None:
             taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}
-        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
-        run.state.leaves.update(taken)
+        run, settled, stages, seen, middle, matched = self._begun(before, taken, suffix)
         ghosts, answers = self._database(before, taken)
         standing = self._given(before) if anew else TRUE
         known = self._protocol(before, taken), answers, standing, self._given(taken)
         contract = undeclared = values.all_of(known)
-        run.settle(self.program)
-        settled = {**before, **run.state.leaves}
-        run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
-        stages, seen, matched = list[TableAt](), list[Leaves](), TRUE
-        for choice in self.level.stages:
-            seen.append({**before, **run.state.leaves})
-            here = self._run(run, choice, matched)
-            stages += here
-            matched = values.both(matched, values.all_of(values.follows(at.runs, at.one_line) for at in here))
-        middle = {**before, **run.state.leaves}
         unmatched = values.either(run.ended, values.negation(matched))
         tables = self._run(run, self.level.tables, matched)
         contract = values.both(contract, self._trusted((*stages, *tables)))
@@ -496,9 +497,28 @@ class TransitionSystem:
         calls = tuple(run.answered)
         return Cycle(
             before, taken, contract, middle, tables, after,
-            run.ended, unmatched, interrupted, calls, settled, acted, undeclared, tuple(stages), tuple(seen),
+            run.ended, unmatched, interrupted, calls, settled, acted, undeclared, stages, seen,
             strange=frozenset(self.clamped if self.refuses else ()), anew=anew,
         )  # fmt: skip
+
+    def middle(self, before: Leaves, suffix: str, taken: Leaves) -> Leaves:
+        """Return every leaf as the table that runs last sees it, in the cycle that takes these inputs (`Cycle.middle`)."""
+        return self._begun(before, taken, suffix).middle
+
+    def _begun(self, before: Leaves, taken: Leaves, suffix: str) -> _Begun:
+        """Run a cycle up to the table that runs last."""
+        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
+        run.state.leaves.update(taken)
+        run.settle(self.program)
+        settled = {**before, **run.state.leaves}
+        run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
+        stages, seen, matched = list[TableAt](), list[Leaves](), TRUE
+        for choice in self.level.stages:
+            seen.append({**before, **run.state.leaves})
+            here = self._run(run, choice, matched)
+            stages += here
+            matched = values.both(matched, values.all_of(values.follows(at.runs, at.one_line) for at in here))
+        return _Begun(run, settled, tuple(stages), tuple(seen), {**before, **run.state.leaves}, matched)
 
     def tables(self, choice: TableChoice, seen: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
         """Match each table of a choice on these leaves; none runs if the cycle does not come to it, `matched`."""

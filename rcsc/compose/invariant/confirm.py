@@ -83,7 +83,7 @@ class Confirmation:
         telling = (clause for clause in clauses if not any(self._never(at, value) for at, value in clause))
         held = [self._held(clause) for clause in telling]
         contract = self.keyed.term(self.cycle.contract)
-        solver = Solver(self.limits, remembers=True)
+        solver = Solver(self.limits, remembers=True, at_once=True)
         solver.add(*self.keyed.ranges, contract, *held)
         return solver
 
@@ -114,7 +114,7 @@ class Confirmation:
     def beginning(self, first: Cycle) -> Solver:
         """Return a solver with one first cycle."""
         contract = self.keyed.term(first.contract)
-        solver = Solver(self.limits)
+        solver = Solver(self.limits, at_once=True)
         solver.add(*self.keyed.ranges, contract)
         return solver
 

@@ -12,7 +12,7 @@ from rcsc.compose.contract.predicates import CLOSELY, Predicate, point
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.walk import Walk
-from rcsc.compose.invariant.cubes import Reached
+from rcsc.compose.invariant.cubes import Reached, Valuation
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
 from rcsc.lang.model import Value
 from rcsc.proof.solvers.options import Limits
@@ -58,6 +58,7 @@ class FoundInvariant:
         open: Obligations searched for, by position, for which the predicates do not suffice.
         walked: States seen on walks; `learnt`, those that the solver added.
         ran: Tables and lines that ran on walks, each with a state after it; `states`, the states after all cycles.
+        columns: The values of predicates in these states, of those asked about so far: a later round asks about most of them again.
     """
 
     predicates: tuple[Predicate, ...] = ()
@@ -67,6 +68,7 @@ class FoundInvariant:
     learnt: int = 0
     ran: Mapping[tuple[str, str], Mapping[str, Value]] = field(default_factory=dict, repr=False)
     states: tuple[Mapping[str, Value], ...] = field(default=(), repr=False)
+    columns: dict[Predicate, tuple[int, ...]] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def named(self) -> tuple[NamedClause, ...]:
@@ -167,7 +169,7 @@ def _searched(
     left: Iterable[int],
     candidates: Sequence[Clause] = (),
 ) -> tuple[FoundInvariant, set[int]]:
-    walked = dict.fromkeys(point(ts, chosen, state) for state in before.states)
+    walked = dict.fromkeys(_points(ts, chosen, before))
     reached = Reached.of(walked)
     weights = [2 if predicate.parts else int(predicate.size > 2) for predicate in chosen]
     tried = [clause for clause in candidates if clause not in before.clauses]
@@ -177,6 +179,14 @@ def _searched(
     learnt = before.learnt + reached.many - len(walked)
     invariant = replace(before, predicates=chosen, clauses=tuple(clauses), walked=len(walked), learnt=learnt)
     return invariant, left_open
+
+
+def _points(ts: TransitionSystem, chosen: Sequence[Predicate], found: FoundInvariant) -> Iterable[Valuation]:
+    """Return the predicates in each state that walks reached."""
+    new = tuple(predicate for predicate in chosen if predicate not in found.columns)
+    asked = zip(*(point(ts, new, state) for state in found.states), strict=True)
+    found.columns.update(zip(new, asked, strict=False))
+    return zip(*(found.columns[predicate] for predicate in chosen), strict=True) if found.states else ()
 
 
 def read(cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:

@@ -375,7 +375,7 @@ def _proved(
         try:
             before = None if refusing is None else _begun(ts, cycle, wanted, refusing)
             from_here = before or FoundInvariant(open=frozenset(range(len(wanted))))
-            from_here = replace(from_here, states=walked.states, ran=walked.ran)
+            from_here = replace(from_here, states=walked.states, ran=walked.ran, columns=walked.columns)
             found = (
                 search(ts, firsts, cycle, wanted, effort, known.clauses, from_here) if searches else from_here
             )

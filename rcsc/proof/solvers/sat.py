@@ -13,6 +13,9 @@ BUDGET = 400_000
 QUESTIONS, CONFLICTS = 200_000, 4_000_000
 """Limits of one solver in all, after which a search is given up; TASK's has some 4,000 questions and 30,000 conflicts."""
 
+_REFUTED = 20
+"""The status of clauses that cannot hold together."""
+
 
 class GaveUpError(Exception):
     """The solver did not decide; nothing may rest on the question."""
@@ -23,13 +26,11 @@ def _simplified(clauses: Iterable[list[int]], read: Iterable[int]) -> list[list[
 
     Source: Een and Biere, "Effective preprocessing in SAT through variable and clause elimination", 2005.
     """
-    from pysat.process import Processor
+    from pysat.solvers import Cadical153
 
-    processor = Processor(bootstrap_with=list(clauses))
-    simpler: list[list[int]] = processor.process(freeze=sorted(set(map(abs, read)))).clauses
-    consistent = processor.status
-    processor.delete()
-    return simpler if consistent else [[1], [-1]]
+    with Cadical153(bootstrap_with=clauses) as processor:
+        status, simpler = processor.process(freeze=sorted(set(map(abs, read))))
+    return [[1], [-1]] if status == _REFUTED else simpler
 
 
 @cache

@@ -328,6 +328,18 @@ def variables(nodes: Iterable[Node]) -> dict[str, Node]:
     return {node.name: node for node in parts_first(*nodes) if node.op == VARIABLE}
 
 
+def each_reads(nodes: Sequence[Node]) -> list[frozenset[str]]:
+    """Return for each node the names of the variables below it; all in one pass, in which a bit stands for each name."""
+    bits: dict[str, int] = {}
+    read: dict[Node, int] = {}
+    for node in parts_first(*nodes):
+        mask = 1 << bits.setdefault(node.name, len(bits)) if node.op == VARIABLE else 0
+        for part in node.args:
+            mask |= read[part]
+        read[node] = mask
+    return [frozenset(name for name, bit in bits.items() if read[node] >> bit & 1) for node in nodes]
+
+
 def domain(nodes: Iterable[Node]) -> list[Term]:
     """State that each variable is in range."""
     return [within(term_of(node), node.kind) for node in nodes if not isinstance(node.kind, Bool)]
