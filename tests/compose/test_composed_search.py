@@ -149,6 +149,13 @@ def test_bits_say_what_the_nodes_mean(number: Node, truth: Node, state: dict[str
     sat.close()
 
 
+@given(numbers(3), truths(3))
+def test_what_each_node_reads_is_found_in_one_pass(number: Node, truth: Node) -> None:
+    both = values.both(truth, values.equal(number, number))
+    found = values.each_reads([number, truth, both])
+    assert found == [values.variables([node]).keys() for node in (number, truth, both)]
+
+
 @given(truths(3))
 def test_what_is_only_compared_holds_for_the_same_questions(truth: Node) -> None:
     """With as few bits as `few` gives, a truth value can be had exactly if some state has it."""

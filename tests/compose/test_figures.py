@@ -25,7 +25,7 @@ from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.compose.contract.watched import opened
 from rcsc.compose.invariant.confirm import Confirmation
-from rcsc.compose.proof import assume_guarantee
+from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
 from rcsc.compose.proof.context import lines_write, never_run
@@ -550,6 +550,24 @@ def test_a_flag_that_turns_while_a_command_waits_is_no_phase(tmp_path: Path) -> 
     assert "flip" in flow._pending_and_flags()
     assert "flip" in flow._phases(0).leaves
     assert "flip" not in flow._phases(1).leaves
+
+
+@pytest.mark.parametrize("most", [1, 2, 400])
+def test_changes_of_phase_of_a_weaker_invariant_are_asked_about_again(
+    lower: tuple[TransitionSystem, LevelProof], monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    """However many of them were listed: the same are found as where none was."""
+    ts, proof = lower
+    cycle = any_cycle(ts)
+    asked = Confirmation(proof.predicates, (), cycle, cycle.cases, Keyed(), Limits())
+    weak = Flow(ts, asked, [])
+    with monkeypatch.context() as few:
+        few.setattr(termination, "MOST_STEPS", most)
+        known = [weak._phases(number) for number in range(len(weak.tables))]
+    anew, again = Flow(ts, asked, proof.clauses), Flow(ts, asked, proof.clauses, weak)
+    found = [anew._phases(number) for number in range(len(known))]
+    assert [again._phases(number) for number in range(len(known))] == found
+    assert found != known
 
 
 def test_of_lines_that_ran_it_is_not_asked_whether_they_never_do(upper: TransitionSystem) -> None:

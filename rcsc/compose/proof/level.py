@@ -500,7 +500,7 @@ def _confirmed_of(posed: _Posed, invariant: FoundInvariant, *, exact: bool = Fal
         found = invariant.clauses
         invariant = strengthened(ts, posed.firsts, posed.cycle, invariant, others)
         if invariant.clauses != found:
-            flow = Flow(ts, asked, invariant.clauses)
+            flow = Flow(ts, asked, invariant.clauses, flow)
     _confirm(asked, invariant.clauses, frozenset(posed.known))
     verdicts = tuple(_verdicts(ts, asked, invariant, wanted, {} if refusing is None else refusing.proved))
     if not looks:

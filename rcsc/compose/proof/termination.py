@@ -30,6 +30,7 @@ Lines for which this is not shown are named in `endless`: they wait for what the
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import ANSWER, FLAG, SETTLES, command_stays
@@ -42,9 +43,9 @@ from rcsc.compose.proof.staying import in_a_row, while_it_stays
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending, spell
 from rcsc.lang.restart import ECHO, ECHOED, NUMBER, STATUS
 from rcsc.proof.solvers import smt
-from rcsc.proof.solvers.smt import Answer
+from rcsc.proof.solvers.smt import Answer, Solver, Term
 from rcsc.proof.symbolic import values
-from rcsc.proof.symbolic.keyed import sort
+from rcsc.proof.symbolic.keyed import Keyed, sort
 from rcsc.proof.symbolic.values import Node
 from rcsc.run.orders.roles import Neighbour
 
@@ -208,12 +209,25 @@ class _Phases:
 
 
 class Flow:
-    """Termination questions of one level, asked from an invariant; none if it reports to no superior."""
+    """Termination questions of one level, asked from an invariant; none if it reports to no superior.
 
-    def __init__(self, ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> None:
+    Attributes:
+        phases: Of each table, by number; `stays`, the questions about cycles in which it stays.
+        listed: The changes of phase that were listed; from a stronger invariant some of them are left, and need not be searched again.
+    """
+
+    def __init__(
+        self,
+        ts: TransitionSystem,
+        asked: Confirmation,
+        clauses: Sequence[Clause],
+        weaker: "Flow | None" = None,
+    ) -> None:
         self.ts, self.asked, self.clauses = ts, asked, clauses
         self.phases: dict[int, _Phases] = {}
-        self._staying: dict[int, Confirmation] = {}
+        self.stays: dict[int, Confirmation] = {} if weaker is None else weaker.stays
+        self.listed: dict[tuple[int, tuple[str, ...]], _Listed] = {}
+        self._weaker = {} if weaker is None else weaker.listed
 
     @property
     def tables(self) -> tuple[TableAt, ...]:
@@ -222,10 +236,10 @@ class Flow:
 
     def staying(self, number: int) -> Confirmation:
         """Return the questions about cycles that keep the command and run this table."""
-        if number not in self._staying:
+        if number not in self.stays:
             name = str(self.tables[number].table.name)
-            self._staying[number] = while_it_stays(self.ts, self.asked, name)
-        return self._staying[number]
+            self.stays[number] = while_it_stays(self.ts, self.asked, name)
+        return self.stays[number]
 
     def endings(self) -> Iterator[Ending]:
         """Yield the ending of each table."""
@@ -381,28 +395,16 @@ class Flow:
         chosen = cycle.tables[number].chosen
         moves = keyed.term(values.all_of((chosen, command_stays(self.ts, cycle), values.negation(stays))))
         nodes = (*before, *after)
-        terms = [keyed.term(node) for node in nodes]
+        terms = {node: keyed.term(node) for node in nodes}
         solver = asked.known(self.clauses)
         solver.add(*keyed.ranges, moves)
-        terms = [solver.named(term) for term in terms]
-        steps: set[Way] = set()
-        while len(steps) < MOST_STEPS:
-            answer = solver.check()
-            if answer is Answer.UNSATISFIABLE:
-                asked.rested_on.append(solver)
-                return steps
-            if answer is Answer.UNKNOWN:
-                return None
-            point = [
-                int(solver.value(term, sort(node.kind))) for node, term in zip(nodes, terms, strict=True)
-            ]
-            steps.add((tuple(point[: len(leaves)]), tuple(point[len(leaves) :])))
-            same = [
-                keyed.has(term, node.kind, value)
-                for node, term, value in zip(nodes, terms, point, strict=True)
-            ]
-            solver.add(smt.negation(smt.all_of(same)))
-        return None
+        ends = _Ends(solver, keyed, nodes, {node: solver.named(term) for node, term in terms.items()})
+        known = self._weaker.get((number, leaves), _Listed(set(), every=False))
+        listed = self.listed[number, leaves] = ends.listed(known)
+        if not listed.every:
+            return None
+        asked.rested_on.append(solver)
+        return listed.steps
 
     # --- three cycles in a row ---
 
@@ -468,6 +470,51 @@ class Flow:
             if here != there and may(solver, now, then)
         }
         return {table for part in parts(steps) for table in part}
+
+
+class _Listed(NamedTuple):
+    """Changes of phase; `every`, unless they are too many or the solver gave up."""
+
+    steps: set[Way]
+    every: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """The phases before and after the cycles that a solver allows.
+
+    Attributes:
+        nodes: Those of a phase before the cycle, and of the one after it; of a leaf that nothing writes these are one node.
+        terms: A constant for each.
+    """
+
+    solver: Solver
+    keyed: Keyed
+    nodes: tuple[Node, ...]
+    terms: Mapping[Node, Term]
+
+    def listed(self, known: _Listed) -> _Listed:
+        """List the changes of phase, those first that were `known` of a weaker invariant and are still possible."""
+        steps = {step for step in sorted(known.steps) if may(self.solver, self._are(step))}
+        if known.every:
+            return _Listed(steps, every=True)
+        for step in sorted(steps):
+            self.solver.add(smt.negation(self._are(step)))
+        while len(steps) < MOST_STEPS:
+            answer = self.solver.check()
+            if answer is not Answer.SATISFIABLE:
+                return _Listed(steps, every=answer is Answer.UNSATISFIABLE)
+            seen = {node: int(self.solver.value(term, sort(node.kind))) for node, term in self.terms.items()}
+            point, half = tuple(seen[node] for node in self.nodes), len(self.nodes) // 2
+            step = point[:half], point[half:]
+            steps.add(step)
+            self.solver.add(smt.negation(self._are(step)))
+        return _Listed(steps, every=False)
+
+    def _are(self, step: Way) -> Term:
+        """Return the term that the cycle makes this change."""
+        point = zip(self.nodes, (*step[0], *step[1]), strict=True)
+        return smt.all_of([self.keyed.has(self.terms[node], node.kind, value) for node, value in point])
 
 
 def _ends(cycle: Cycle, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:

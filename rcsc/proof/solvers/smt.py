@@ -9,7 +9,7 @@ import struct
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -524,13 +524,20 @@ class Solver:
         if self._counted_alone:
             self._solver.set("arith.enable_hnf", False)
         permanent, *pushed = self._asserted
-        self._solver.add(*permanent)
+        self._assert(permanent)
         if self._incremental and not assuming:  # until then Z3 asks another solver than it did before
             self._solver.push()
             self._solver.pop()
         for terms in pushed:
             self._solver.push()
-            self._solver.add(*terms)
+            self._assert(terms)
+
+    def _assert(self, terms: Iterable[Term]) -> None:
+        """State the terms to Z3; its own `add` converts each first."""
+        z3 = _z3()
+        ctx = z3.main_ctx().ref()
+        for term in terms:
+            z3.Z3_solver_assert(ctx, self._solver.solver, _ast(term))
 
     def _mend(self, assuming: tuple[Term, ...] = ()) -> None:
         """Begin anew after a question that was broken off."""
@@ -564,7 +571,7 @@ class Solver:
         """Assert the terms."""
         self._asserted[-1] += terms
         if not self._broken:
-            self._solver.add(*terms)
+            self._assert(terms)
 
     def push(self) -> None:
         """Remember what is asserted now, for `pop`."""
