@@ -105,6 +105,29 @@ def test_nothing_is_counted_where_nothing_asks() -> None:
     assert not any(v.counts for v in program_of(text).variables)
 
 
+def test_a_time_may_be_said_in_cycles() -> None:
+    times = (("for delay", "for 3 cycles"), ("0.6 [s] ", "6 cycles"), ("for 0.2 [s]", "for 1 + 1 cycles"))
+    said = program_of(after(*times))
+    assert said.procedures == PROGRAM.procedures
+    old, new = (
+        [test.condition for line in one.tables[0].lines for test in line.tests if test is not None]
+        for one in (PROGRAM, said)
+    )
+    assert old == new
+    two = re.sub(r"for (delay|[0-9.]+ \[m?s\])", "for 3 cycles", TEXT)
+    two = two.replace("level button", "level other { period 40 [ms] table watch }\nlevel button")
+    assert len(program_of(two).levels) == 2
+
+
+def test_a_place_may_be_called_cycles() -> None:
+    text = after(
+        ("x > 3 for delay", "x > 3 for delay\n  cycles := x > 3 for 3 cycles"),
+        ("state early", "state cycles : bool\nstate early"),
+    )
+    [note] = (one for one in program_of(text).procedures if one.name == "note")
+    assert len(note.body) == 8
+
+
 def test_times_of_one_condition_part_lines() -> None:
     assert prove_program(PROGRAM, Options()).proved is not None
     wrong = edited(
@@ -175,12 +198,17 @@ def after(*edits: tuple[str, str]) -> str:
         (after(("for delay", "for 0 [s]")), "RCS317", "`0 [s]` is no whole number of cycles of 100 ms, 1 or more"),
         (after(("for delay", "for 3")), "RCS302", "what has to hold does so for a time in `ms` or `s`"),
         (after(("for delay", "for x")), "RCS305", "a time is a constant"),
+        (after(("for delay", "for x cycles")), "RCS305", "a time is a constant"),
+        (after(("for delay", "for 0 cycles")), "RCS317", "`0 cycles` is no number of cycles from 1 to 4294967295"),
+        (after(("for delay", "for delay cycles")), "RCS317", "`delay cycles` is no number of cycles from 1 to 4294967295"),
+        (after(("for delay", "for 2.0 cycles")), "RCS317", "`2.0 cycles` is no number of cycles from 1 to 4294967295"),
+        (after(("for delay", "for true cycles")), "RCS317", "`true cycles` is no number of cycles from 1 to 4294967295"),
         (after(("level button { period 100 [ms] preprocess guess table watch }", "")), "RCS317",
          "no level says how long a cycle is, so that a time is no number of cycles"),
         (after(("level button", "level other { period 40 [ms] table watch }\nlevel button")), "RCS317",
          "how many cycles a time is depends on the level: they have periods of 40 ms and 100 ms"),
         (TEXT + "table idle {\n| line | b for 1 [s] ||\n| a | true ||\n| c | false ||\n}", "RCS317",
-         "no level runs table `idle`, so that a time is no number of cycles"),
+         "no level runs table `idle`, so that nothing counts its cycles"),
         (after(("x > 3 for delay", "was (x > 3 for delay)")), "RCS315", "`for` goes back one cycle, not two"),
         (after(("x > 3 for delay", "@T(b) for delay")), "RCS315",
          "what has to hold for a time is a condition of one cycle, without an event, events and another `for`"),
@@ -253,7 +281,15 @@ def test_the_nearest_times_are_offered() -> None:
 
 @pytest.mark.parametrize(
     "cell",
-    ["> 3 for 2 [s]", "4 for 500 [ms]", "in {1, 2} for 2 [s]", "not in 2 .. 5 for 1 [s]", "2 .. 5 for delay"],
+    [
+        "> 3 for 2 [s]",
+        "4 for 500 [ms]",
+        "in {1, 2} for 2 [s]",
+        "not in 2 .. 5 for 1 [s]",
+        "2 .. 5 for delay",
+        "> 3 for 2 cycles",
+        "in {1, 2} for n + 1 cycles",
+    ],
 )
 def test_cells_are_laid_out_as_they_were_meant(cell: str) -> None:
     text = f"table t {{\n  | line | x | when ||\n  | a | {cell} | (x > 3 or b) for 1 [s] and not (b for 1 [s]) ||\n}}\n"

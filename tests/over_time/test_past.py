@@ -75,7 +75,7 @@ def text(of: Formula) -> str:
         case (name,):
             return str(name)
         case ("for", inner, cycles):
-            return f"({text(inner)}) for {cycles}0 [ms]"
+            return f"({text(inner)}) for {f'{cycles}0 [ms]' if cycles % 2 else f'{cycles} cycles'}"
         case (word, inner):
             return f"{word} ({text(inner)})"
         case (word, left, right):

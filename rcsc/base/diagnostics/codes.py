@@ -886,7 +886,7 @@ class Code(StrEnum):
 
     `c for 2 [s]` counts cycles of the level that runs the table, so that a time is a whole number of them, 1 or more: with a period of
     40 ms 2 s are 50 cycles, and 50 ms are none. A table that no level runs has no cycles to count, and levels of several periods in
-    one program have different ones.
+    one program have different ones. `c for 2 cycles` says it in cycles.
 
         input pressed : bool
         state held : bool

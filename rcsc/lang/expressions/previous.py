@@ -47,6 +47,8 @@ from rcsc.lang.model import (
     VariableName,
 )
 from rcsc.lang.restart import Adopted, After, SameAs, Stands
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_expr
 
 KEEP = "keep_previous"
 """The procedure that ends a cycle; a digit is added where the program has one of that name."""
@@ -91,8 +93,17 @@ _MS = {(("ms", 1),): 1, (("s", 1),): 1000}
 """Milliseconds of each unit of time."""
 
 
-def cycles_of(scope: Scope, time: Value, unit: Unit, span: Span) -> int | None:
-    """Return the number of cycles in a constant time, at least 1; None (reported) where it is no whole number of them."""
+def cycles_of(scope: Scope, written: tree.Time, time: Value, unit: Unit, helps: str = "") -> int | None:
+    """Return the number of cycles in a time whose value is known, at least 1; None (reported) where it is no whole number of them."""
+    span = written.span
+    if not _counts(scope, span):
+        return None
+    if written.cycles:
+        if not unit and isinstance(time, int) and not isinstance(time, bool) and 1 <= time <= MOST_CYCLES:
+            return time
+        message = f"`{spell_expr(written.value)} cycles` is no number of cycles from 1 to {MOST_CYCLES}"
+        scope.report(Code.NO_CYCLES, message, span, helps)
+        return None
     period = _period(scope, span)
     if period is None:
         return None
@@ -116,13 +127,19 @@ def _in_ms(number: int) -> str:
     return f"{number // 1000} [s]" if number % 1000 == 0 else f"{number} [ms]"
 
 
+def _counts(scope: Scope, span: Span) -> bool:
+    """Return whether cycles are counted where `for` stands; report it where they are not."""
+    nowhere = "`for` stands in tables, assumptions, procedures and properties"
+    message = nowhere if scope.periods is None else scope.untimed
+    if message:
+        scope.report(Code.NO_CYCLES, message, span)
+    return not message
+
+
 def _period(scope: Scope, span: Span) -> int | None:
     """Return the period of the program's levels in ms; None (reported) where they have several, or none."""
-    if scope.periods is None:
-        message = "`for` stands in tables, assumptions, procedures and properties"
-    elif scope.untimed:
-        message = scope.untimed
-    elif len(scope.periods) > 1:
+    assert scope.periods is not None
+    if len(scope.periods) > 1:
         every = " and ".join(f"{period} ms" for period in scope.periods)
         message = f"how many cycles a time is depends on the level: they have periods of {every}"
     elif not scope.periods:

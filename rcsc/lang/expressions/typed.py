@@ -418,21 +418,21 @@ def _nested(scope: Scope, why: str) -> AbstractContextManager[None]:
 
 
 def for_a_time(
-    scope: Scope, body: Body, condition: Expr, text: str, written: tree.Expr, span: Span
+    scope: Scope, body: Body, condition: Expr, text: str, written: tree.Time, span: Span
 ) -> Typed | None:
     """Resolve `c for 2 [s]`: c holds, and has held for that time or longer."""
     if scope.no_before:
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before.replace("`was`", "`for`"), span)
         return None
     with without_before(scope, "a time is a constant"):
-        time = typed(scope, body, written)
+        time = typed(scope, body, written.value)
     value = None if time is None else fold(time.expr)
     if time is None:
         return None
     if value is None:
-        scope.report(Code.NOT_CONSTANT, "a time is a constant", written.span)
+        scope.report(Code.NOT_CONSTANT, "a time is a constant", written.value.span)
         return None
-    cycles = cycles_of(scope, value, time.unit(), written.span)
+    cycles = cycles_of(scope, written, value, time.unit())
     held = None if cycles is None else lasting(scope, condition, text, cycles, span)
     return None if held is None else Typed(held)
 

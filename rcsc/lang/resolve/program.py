@@ -231,7 +231,7 @@ class _Resolver:
                     elif relied.text not in assumptions:
                         self.scope.unknown("assumption", relied, list(assumptions))
                 name = declaration.name.text
-                missing = f"no level runs table `{name}`, so that a time is no number of cycles"
+                missing = f"no level runs table `{name}`, so that nothing counts its cycles"
                 self.scope.untimed = "" if name in run else missing
                 tables.append(table(self.scope, declaration))
         self.scope.untimed = ""

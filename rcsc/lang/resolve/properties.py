@@ -269,16 +269,7 @@ def _cycles(scope: Scope, written: tree.Time) -> int | None:
     value = constant(scope, written.value)
     if value is None:
         return None
-    time = value.literal().value
-    if not written.cycles:
-        return cycles_of(scope, time, value.unit(), written.span)
-    if value.unit() or not isinstance(value.expr.type, Int) or not 1 <= time <= monitor.MOST_CYCLES:
-        message = (
-            f"`{spell_expr(written.value)} cycles` is no number of cycles from 1 to {monitor.MOST_CYCLES}"
-        )
-        scope.report(Code.NO_CYCLES, message, written.span, "the cycle that asks is `at once`")
-        return None
-    return int(time)
+    return cycles_of(scope, written, value.literal().value, value.unit(), "the cycle that asks is `at once`")
 
 
 def _remembers(scope: Scope, written: tree.RequirementDecl, required: requirement.Requirement) -> bool:

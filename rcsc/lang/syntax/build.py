@@ -445,7 +445,7 @@ class Build:
         return tree.Event(self._name(word), self.expr(condition), self.expr(parts[-1]), span)
 
     def _lasts(self, parts: list[Any], span: Span) -> tree.Expr:
-        return tree.Lasts(self.expr(parts[0]), self.expr(parts[-1]), span)
+        return tree.Lasts(self.expr(parts[0]), self._time(parts[-1]), span)
 
     def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.InSet(self.expr(parts[0]), self._members(parts[-1].children), span, len(parts) > 2)
@@ -540,16 +540,16 @@ class Build:
         if happening is not None:
             return happening
         if node.data == "lasts":
-            return tree.Lasting(self._untimed(parts[0]), self.expr(parts[-1]), span)
+            return tree.Lasting(self._untimed(parts[0]), self._time(parts[-1]), span)
         if node.data == "equals" and parts[0].data == "lasts":
             value, *_, time = parts[0].children
             within = self._span(value)
-            return tree.Lasting(tree.Comparison("=", self.expr(value), within), self.expr(time), span)
+            return tree.Lasting(tree.Comparison("=", self.expr(value), within), self._time(time), span)
         last = parts[-1] if node.data == "listed" else None
         if last is not None and self._rule(last) == "lasts":  # of the whole list
             value, *_, time = last.children
             members = self._members([*parts[:-1], value])
-            return tree.Lasting(tree.OneOf(members, span), self.expr(time), span)
+            return tree.Lasting(tree.OneOf(members, span), self._time(time), span)
         return self._untimed(node)
 
     def _happening(self, node: ParseNode) -> tree.Happens | None:

@@ -49,6 +49,7 @@ _WORDS = {
     "AT_ONCE": "`once`",
     "WATCHED": "`monitored`",
     "_OVER_TIME": "`:`",
+    "_CYCLES": "`cycles`",
     "MASK": "bits",
     "_INT": "`int`",
     "_REAL": "`real`",
@@ -66,6 +67,7 @@ _CLASSES = {
     "_REAL": ("real",),
     "_SINGLE": ("single",),
     "_SET": ("set",),
+    "_CYCLES": ("cycles",),
 }
 """The words of the terminals that are not called as their one word is."""
 _SYMBOLS = frozenset(
@@ -102,7 +104,7 @@ def expected(terminals: Iterable[str]) -> str:
 
 
 _HELPS = {
-    "CYCLES": "a time is a number of the level's own cycles: `within 25 cycles`",
+    "_CYCLES": "a time is a number of the level's own cycles: `within 25 cycles`",
     "REST": "a link says which command rests: `command : TYPE rest MEMBER`",
     "DONE": _STATUS,
     "FAILED": _STATUS,

@@ -60,7 +60,7 @@ def _asks(one: tree.RequirementDecl) -> Iterator[str]:
 
 
 def _takes(one: tree.RequirementDecl) -> Iterator[str]:
-    time = "" if one.time is None else spell_expr(one.time.value, SUM) + " cycles" * one.time.cycles
+    time = "" if one.time is None else _time(one.time)
     match one.timing:
         case "at most":
             assert one.times is not None
@@ -181,8 +181,12 @@ def spell_member(member: tree.Member) -> str:
     return spell_expr(member)
 
 
-def _for(time: tree.Expr) -> str:
-    return f"for {spell_expr(time, SUM)}"
+def _for(time: tree.Time) -> str:
+    return f"for {_time(time)}"
+
+
+def _time(time: tree.Time) -> str:
+    return spell_expr(time.value, SUM) + " cycles" * time.cycles
 
 
 def _in(written: tree.InSet | tree.InRange | tree.OneOf) -> str:

@@ -170,11 +170,20 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Time:
+    """`200 [ms]`, or `3 cycles`."""
+
+    value: "Expr"
+    cycles: bool
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class Lasts:
     """`a for 2 [s]`: a holds, and has held for that time or longer."""
 
     condition: "Expr"
-    time: "Expr"
+    time: Time
     span: Span = at()
 
 
@@ -468,7 +477,7 @@ class Lasting:
     """A condition cell `> 3 for 2 [s]`: one that has held for that time or longer."""
 
     condition: Comparison | OneOf | Between
-    time: Expr
+    time: Time
     span: Span = at()
 
 
@@ -710,15 +719,6 @@ class PropertyDecl(Required):
     condition: Expr
     word: str = ""
     other: Expr | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Time:
-    """`200 [ms]`, or `3 cycles`."""
-
-    value: Expr
-    cycles: bool
-    span: Span = at()
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,6 +57,7 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
         st.builds(tree.Was, inner),
         st.builds(tree.Once, inner),
         st.builds(tree.Since, inner, inner),
+        st.builds(tree.Lasts, inner, st.builds(tree.Time, inner, st.booleans())),
         st.builds(tree.Binary, BINARY, inner, inner),
         st.builds(tree.InSet, inner, _members(inner), negated=st.booleans()),
         st.builds(tree.InRange, inner, inner, inner, negated=st.booleans()),

@@ -278,7 +278,7 @@ class _Walk:
                 yield from self.exprs((low, high))
             case tree.Lasting(condition, time):
                 yield from self.condition(condition)
-                yield from self.expr(time)
+                yield from self.expr(time.value)
             case tree.Happens(_, operand, guard):
                 yield from () if operand is None else self.condition(operand)
                 yield from () if guard is None else self.expr(guard)
@@ -392,7 +392,7 @@ def _operands(expr: tree.Expr) -> tuple[tree.Expr | None, ...]:
     match expr:
         case tree.IndexOf(first, second) | tree.Binary(_, first, second):
             return first, second
-        case tree.Lasts(first, second) | tree.Since(first, second):
+        case tree.Since(first, second) | tree.Lasts(first, tree.Time(second)):
             return first, second
         case tree.BitsOf(first, second, third) | tree.InRange(first, second, third):
             return first, second, third
