@@ -7,6 +7,7 @@ import pytest
 from rcsc.compose.contract.obligations import obligations, pairs
 from rcsc.compose.exact import explicit
 from rcsc.compose.exact.circuit import circuit, key_of_word, points_of
+from rcsc.compose.exact.unrolled import Unrolled
 from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, key_bounds, key_of
 from rcsc.lang.operator_table import Comparison, Op
 from rcsc.proof.symbolic import values
@@ -97,3 +98,13 @@ def test_arithmetic_of_reals_is_open_and_named() -> None:
     made = circuit(ts, tuple(ts.firsts().values()), step, obligations(ts, step))
     assert any("`*` of real" in one for one in made.opened), made.opened
     assert all(" of real" in one for one in made.opened)
+
+
+def test_the_difference_of_two_numbers_is_taken_round() -> None:
+    ts = alone(OVERLAP)
+    step = ts.cycle(ts.havoc())
+    run = Unrolled(circuit(ts, (), step, pairs(step)), None)
+    for one, other in product(range(8), repeat=2):
+        a, b = ([TRUE if number >> at & 1 else FALSE for at in range(3)] for number in (one, other))
+        difference = [TRUE if (one - other) >> at & 1 else FALSE for at in range(3)]
+        assert run.difference(a, b) == tuple(difference)

@@ -1,6 +1,7 @@
 """What is required *eventually* of a level: proved, with what it trusts; refuted, by a lasso that is shown, kept and run again."""
 
 import json
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,21 +12,32 @@ import pytest
 
 from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import NEVER_REFUSED, NOT_FOR_EVER
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, obligations
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import one_cycle
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings
 from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso, waiting_lasso_of
 from rcsc.compose.counterexample.trace import TraceSearch
+from rcsc.compose.exact.circuit import roots_of
+from rcsc.compose.exact.shifted import numbers_above
 from rcsc.compose.proof.assume_guarantee import of_level
-from rcsc.compose.proof.eventually import Try, waiting
+from rcsc.compose.proof.eventually import Try, circuit_of, waiting, waits_of
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level, proved_bound
 from rcsc.compose.proof.system import keep, prove_transition_systems, recall, transition_systems
 from rcsc.front.commands import run
 from rcsc.front.commands.systems.explained import _no_run
 from rcsc.lang.interpret import Fault, holds, initial
+from rcsc.lang.model import Value, key_bounds, value_of_key
 from rcsc.proof.solvers.smtlib import cvc5_refutes
-from tests.support.programs.systems import LITTLE, alone, small_level, small_system, small_text, solo_system
+from tests.support.programs.systems import (
+    LITTLE,
+    SYSTEM,
+    alone,
+    small_level,
+    small_system,
+    small_text,
+    solo_system,
+)
 
 GIVEN = """\
 input asked : int 0 .. 3
@@ -199,6 +211,84 @@ def test_a_lasso_gives_orders_or_has_answers(tmp_path: Path) -> None:
     assert isinstance(lasso, Lasso)
     [step] = lasso.trace.steps[lasso.first - 1 :]
     assert step.after["lower.status_report"] != step.after["report.status_report"] == 2
+
+
+REPLACED = """
+requirement ends : whenever report.status_report = executing, eventually report.status_report = done or not there
+"""
+TAKES = (
+    "new_command := command.inc_command /= inc_command_seen\n  inc_command_seen := command.inc_command",
+    "new_command := command.inc_command {}\n  if command.inc_command {} {{ inc_command_seen := command.inc_command }}",
+)
+
+
+def taking(folder: Path, which: str) -> TransitionSystem:
+    """Return the lower level that takes only some numbers of orders for new ones."""
+    taken = TAKES[0], TAKES[1].format(which, which)
+    return small_level(folder, "lower", lower=small_text("lower", taken) + REPLACED)
+
+
+def test_new_orders_for_ever_are_a_lasso_whose_numbers_go_on(tmp_path: Path) -> None:
+    """Only the next number is a new order: no state comes again before 65536 of them."""
+    ts = taking(tmp_path, "= (inc_command_seen + 1) mod 65536")
+    for search in (TraceSearch(4, legal=True), TraceSearch(4)):
+        lasso = waiting_lasso(ts, "ends", [search])
+        assert isinstance(lasso, Lasso)
+        assert [step.taken["command.inc_command"] for step in lasso.trace.steps] == [1, 2]
+        assert lasso.first == 2
+        assert waiting_lasso_of(ts, "ends", lasso.trace.steps) == 2
+    made = circuit_of(ts, waiting(ts)["ends"])
+    assert made is not None
+    found = waits_of(made).lasso  # by clauses, which need no such limit
+    assert found is not None
+    assert (found.first, len(found.run.given)) == (2, 2)
+
+
+@pytest.mark.parametrize(
+    "which",
+    [
+        "/= inc_command_seen and command.inc_command mod 2 = 1",
+        "/= inc_command_seen and command.inc_command /= 3",
+        "> inc_command_seen",
+        "= (inc_command_seen * 2 + 1) mod 65536",
+        "= (inc_command_seen + 1) mod 65535",
+    ],
+)
+def test_numbers_that_are_told_apart_do_not_go_on(which: str, tmp_path: Path) -> None:
+    assert ordered(taking(tmp_path, which)) == set()
+
+
+def ordered(ts: TransitionSystem) -> frozenset[str]:
+    """Return the leaves whose numbers may go on, of all that its obligations depend on."""
+    step = ts.cycle(ts.havoc())
+    leaves, nodes = roots_of(step, obligations(ts, step))
+    return numbers_above(ts, step, leaves, nodes)
+
+
+@pytest.mark.parametrize("level", ["lower", "upper"])
+def test_a_cycle_goes_likewise_where_numbers_are_later(level: str) -> None:
+    """On the interpreter: from any state and inputs, with all numbers later by as much."""
+    ts, random = transition_systems(SYSTEM)[level], Random(5)  # noqa: S311  # the same each time
+    numbers = ordered(ts)
+    assert numbers == {"command.inc_command", "inc_command_seen", "report.inc_command_echo"}
+    for _ in range(200):
+        before, other = ({leaf: any_of(ts, leaf, random) for leaf in ts.program.kinds} for _ in range(2))
+        by = random.choice((1, 2, 65535, random.randrange(65536)))
+        taken = {leaf: other[leaf] for leaf in ts.inputs}
+        now = one_cycle(ts, before, taken)
+        then = one_cycle(ts, moved(before, numbers, by), moved(taken, numbers, by))
+        assert (now.fault, now.line) == (then.fault, then.line)
+        assert moved(now.after, numbers, by) == then.after
+
+
+def any_of(ts: TransitionSystem, leaf: str, random: Random) -> Value:
+    low, high = key_bounds(ts.kinds[leaf])
+    return value_of_key(ts.kinds[leaf], random.choice((low, high, random.randint(low, min(high, low + 3)))))
+
+
+def moved(leaves: Mapping[str, Value], numbers: Collection[str], by: int) -> dict[str, Value]:
+    """Return the leaves with the numbers later by as much."""
+    return {leaf: (int(value) + by) % 65536 if leaf in numbers else value for leaf, value in leaves.items()}
 
 
 # --- shown, kept, run again ------------------------------------------------------------------------

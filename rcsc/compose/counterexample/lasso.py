@@ -2,7 +2,8 @@
 
 In: a transition system; tables whose commands are not shown to end, or a requirement that is not shown not to wait for ever. Out: `Lasso`s.
 A lasso is a row of cycles after which every leaf but the numbers of orders is as before: of one command, unanswered in some of them; or
-such that the requirement waits in each, and then leaves are enough that it depends on. It is *fair*: each subordinate gets an order in it,
+such that the requirement waits in each, and then leaves are enough that it depends on; numbers of the superior may go on, too, where the
+level does nothing with them that tells one from another (`exact.shifted`). It is *fair*: each subordinate gets an order in it,
 or has answered in all of its cycles, and nothing is refused. The interpreter runs what the solver finds, and then the lasso once more: the
 second time has to be like the first, with numbers that are as much later.
 """
@@ -18,11 +19,12 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, Given, as_cycle, as_
 from rcsc.compose.counterexample.trace import USUAL, NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.exact.circuit import roots_of
 from rcsc.compose.exact.played import played
+from rcsc.compose.exact.shifted import later_by, numbers_above
 from rcsc.compose.proof.eventually import circuit_of, never_waits, waiting, waits_of
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault, holds
-from rcsc.lang.model import Expr, Value
-from rcsc.lang.restart import NUMBERS
+from rcsc.lang.model import Expr, Int, Value
+from rcsc.lang.restart import NUMBERED, NUMBERS
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import Node
@@ -122,16 +124,24 @@ def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) ->
 
 def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int | None:
     """Return the first cycle, from 1, of the shortest lasso with which the run ends; None if it ends with none."""
-    return _first_of(ts, steps, partial(_is_lasso, ts, table))
+    return _first_of(ts, steps, partial(_is_lasso, ts, table), _echoes(ts))
+
+
+def _echoes(ts: TransitionSystem) -> dict[str, str]:
+    """Return the echoes of subordinates, each with the number as much later than which it comes in the next lap."""
+    return {below.echo: below.number for below in ts.links.below}
 
 
 def _first_of(
-    ts: TransitionSystem, steps: Sequence[CycleRun], is_lasso: Callable[[Sequence[CycleRun]], bool]
+    ts: TransitionSystem,
+    steps: Sequence[CycleRun],
+    is_lasso: Callable[[Sequence[CycleRun]], bool],
+    later: Mapping[str, str],
 ) -> int | None:
     for first in range(len(steps) - 1, 0, -1):
         lasso = steps[first:]
         if is_lasso(lasso):
-            again = _again(ts, lasso)
+            again = _again(ts, lasso, later)
             same = [(cycle_run.table, cycle_run.line) for cycle_run in lasso] == [
                 (cycle_run.table, cycle_run.line) for cycle_run in again
             ]
@@ -150,14 +160,14 @@ def _is_true(condition: Node) -> bool:
     return condition.known and bool(condition.low)
 
 
-def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, ...]:
-    """Run the lasso again on the same inputs, with echoes as much later as the orders."""
+def _again(ts: TransitionSystem, lasso: Sequence[CycleRun], later: Mapping[str, str]) -> tuple[CycleRun, ...]:
+    """Run the lasso again on the same inputs, but those that go on: each as much later as the leaf that it goes on with."""
     before, after = lasso[0].before, lasso[-1].after
-    later = {below.echo: int(after[below.number]) - int(before[below.number]) for below in ts.links.below}
+    by = {leaf: int(after[number]) - int(before[number]) for leaf, number in later.items()}
     given = [
         (
             {
-                leaf: (int(value) + later[leaf]) % NUMBERS if leaf in later else value
+                leaf: (int(value) + by[leaf]) % NUMBERS if leaf in by else value
                 for leaf, value in step.taken.items()
             },
             step.answers,
@@ -178,12 +188,14 @@ class _Waiting:
         ts: The level, which owes that it never waits.
         waits: The condition that it waits, on the states of its monitor.
         leaves: The leaves that this depends on.
+        ordered: Of these the numbers of the superior, which may go on all by as much.
     """
 
     ts: TransitionSystem
     owed: Obligation
     waits: Expr
     leaves: tuple[str, ...]
+    ordered: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, ts: TransitionSystem, name: str) -> "_Waiting":
@@ -191,12 +203,22 @@ class _Waiting:
         stated = waiting(ts)[name]
         assert stated.monitor is not None
         never, owed = never_waits(ts, stated)
-        return cls(never, owed, stated.monitor.waits, roots_of(never.cycle(never.havoc()), [owed])[0])
+        step = never.cycle(never.havoc())
+        leaves, nodes = roots_of(step, [owed])
+        return cls(never, owed, stated.monitor.waits, leaves, numbers_above(never, step, leaves, nodes))
 
     @property
     def numbers(self) -> frozenset[str]:
         """The numbers of orders, and their echoes, which go on."""
-        return frozenset(leaf for below in self.ts.links.below for leaf in (below.number, below.echo))
+        below = {leaf for below in self.ts.links.below for leaf in (below.number, below.echo)}
+        return self.ordered | below
+
+    @property
+    def later(self) -> dict[str, str]:
+        """The inputs that go on, each with the leaf that it goes on with."""
+        above = self.ts.links.above
+        more = {above.number: above.number} if above is not None and self.ordered else {}
+        return {**_echoes(self.ts), **more}
 
     def goes(self, cycle: Cycle) -> Node:
         """Return the condition that it waits in a cycle, in which nothing is refused."""
@@ -211,12 +233,18 @@ class _Waiting:
             for leaf in self.leaves
             if leaf not in self.numbers
         )
-        return values.all_of((*same, *_due(self.ts, cycles)))
+        by = values.variable("numbers go on by", Int(*NUMBERED))
+        on = (
+            values.equal(later_by(first.before[leaf], by), last.after[leaf]) for leaf in sorted(self.ordered)
+        )
+        return values.all_of((*same, *on, *_due(self.ts, cycles)))
 
     def is_lasso(self, lasso: Sequence[CycleRun]) -> bool:
         """Return whether cycles that were run are a lasso on which it waits: on values, which is quick where it is long."""
         begins, ends = ({**lasso[0].before, **lasso[0].found}, {**lasso[-1].after, **lasso[-1].left})
         if any(begins.get(leaf) != ends.get(leaf) for leaf in self.leaves if leaf not in self.numbers):
+            return False
+        if len({(int(ends[leaf]) - int(begins[leaf])) % NUMBERS for leaf in self.ordered}) > 1:
             return False
         if not all(step.fault is Fault.OK and holds(self.waits, step.left) for step in lasso):
             return False
@@ -281,7 +309,7 @@ def _ran_round(
     try:
         begun, *later = ran_on(waits.ts, start, given)
         steps = replace(begun, anew=search.restarted), *later
-        first = _first_of(waits.ts, steps, waits.is_lasso) if len(steps) == len(given) else None
+        first = _first_of(waits.ts, steps, waits.is_lasso, waits.later) if len(steps) == len(given) else None
     except UNDEFINED:
         return NotReproducedError(shown, undefined=True)
     if first is None or not all(as_declared(waits.ts, step) for step in steps):
@@ -296,4 +324,4 @@ def waiting_lasso_of(ts: TransitionSystem, name: str, steps: Sequence[CycleRun])
         KeyError: No requirement of this name may wait for ever.
     """
     waits = _Waiting.of(ts, name)
-    return _first_of(waits.ts, steps, waits.is_lasso)
+    return _first_of(waits.ts, steps, waits.is_lasso, waits.later)

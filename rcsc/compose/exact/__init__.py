@@ -13,7 +13,7 @@ answer questions about that, or about the same nodes as integers:
 `portfolio` is their face for proofs: cheapest first, budgets in steps. What an engine finds is said as conditions on leaves (`said`),
 which are predicates like all others: so Z3 confirms them on words, a certificate holds them, and people read them. `played` is the face
 for runs: the interpreter repeats each before it is shown. So neither gates nor engines are trusted. `export` writes the circuit for model
-checkers of others.
+checkers of others; `shifted` tells which numbers of orders may go on in a lasso.
 
 A light that counts to 30 before it may go on: the search over predicates knows of no number but those that the table compares; here
 `wait <= 30 and (now = red or wait = 0)` is found because the level has 31 states of the first kind and one of each other.

@@ -172,6 +172,7 @@ class Circuit:
         count: Variables in all; those that are neither gates nor latches are inputs.
         given: The variables that the environment gives, by name.
         opened: The operations that were left open.
+        numbers: Leaves of which it does not matter if all are later by as much (`shifted`), if that was asked.
     """
 
     wanted: tuple[ObligationKey, ...]
@@ -185,6 +186,7 @@ class Circuit:
     count: int
     given: Mapping[str, Given] = field(repr=False)
     opened: tuple[str, ...] = ()
+    numbers: frozenset[str] = frozenset()
 
     def needed(self, literals: Iterable[Literal]) -> frozenset[Literal]:
         """Return the variables on which these literals depend, gates included."""

@@ -1,14 +1,15 @@
 """For how long a requirement waits, over all states or over short runs; and the shortest run on which it waits for ever.
 
 In: a circuit with one obligation, which every cycle breaks in which the requirement waits. Out: `Waits`. On a *lasso* it waits for ever:
-from some cycle on it does so in each, and the last one leaves the state that the first of these found.
+from some cycle on it does so in each, and the last one leaves the state that the first of these found; numbers of orders that may be later
+may be so (`shifted`).
 
 Over all states: cycles in which it waits are the edges of a graph. States that none of its edges leaves are taken out, again and again.
 If all go, the longest way is as many cycles as it may wait; if some stay, each of these has such an edge to another, and a lasso is there.
 """
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from rcsc.compose.exact.circuit import Circuit
 from rcsc.compose.exact.explicit import Pass, Run, Search, State, applies, at_literal
 from rcsc.compose.exact.unrolled import Unrolled
 from rcsc.proof.solvers.sat import GaveUpError, Sat
-from rcsc.proof.symbolic.bits import FALSE, TRUE
+from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal
 
 MOST_EDGES = 2_000_000
 """An effort that is the same on every machine: cycles in which it waits, each a way from one state to another."""
@@ -27,7 +28,7 @@ MOST_GATES, MOST_CONFLICTS, MOST_CYCLES = 300_000, 2_000, 24
 
 @dataclass(frozen=True, slots=True)
 class Lasso:
-    """A run on which it waits for ever: after its last cycle all is as it was before cycle `first`, counted from 1."""
+    """A run on which it waits for ever: after its last cycle all but `Circuit.numbers` is as before cycle `first`, counted from 1."""
 
     run: Run
     first: int
@@ -200,6 +201,7 @@ class _Row:
 
     def __init__(self, circuit: Circuit, number: int) -> None:
         self.run = Unrolled(circuit, number, Sat([[TRUE]], conflicts=MOST_CONFLICTS))
+        self._circuit = circuit
         self._waits: list[int] = []
         self._latches: list[tuple[int, ...]] = []
 
@@ -207,10 +209,20 @@ class _Row:
         """Add a cycle; return in how many in a row it may have waited at the end, if in more than so many."""
         self.run.further()
         self._waits.append(self.run.broken[0])
-        self._latches.append(self.run.latches)
+        self._latches.append(
+            self._told_apart(dict(zip(self._circuit.latches, self.run.latches, strict=True)))
+        )
         while most < len(self._waits) and self._may(self._waits[-most - 1 :]):
             most += 1
         return most
+
+    def _told_apart(self, latches: Mapping[Literal, Literal]) -> tuple[Literal, ...]:
+        """Return the bits after the last cycle by which states differ: of numbers that may all be later, those of their differences."""
+        every = zip(self._circuit.leaves, self._circuit.words, strict=True)
+        words = {leaf: [latches[abs(bit)] for bit in word if abs(bit) != TRUE] for leaf, word in every}
+        first, *others = [words.pop(leaf) for leaf in sorted(self._circuit.numbers)] or [[]]
+        apart = [bit for other in others for bit in self.run.difference(other, first)]
+        return (*(bit for word in words.values() for bit in word), *apart)
 
     def comes_round(self) -> int | None:
         """Return the first cycle, from 1, of the shortest loop at the end in which it waits; None where there is none."""

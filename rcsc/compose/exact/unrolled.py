@@ -3,7 +3,7 @@
 In: a circuit. Out: literals of the last cycle, under which there is such a run or none.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.compose.exact.circuit import EARLY, Circuit, Frame
@@ -67,6 +67,15 @@ class Unrolled:
     def same(self, a: Literal, b: Literal) -> Literal:
         """Return the literal that two others are the same."""
         return self._both(-self._both(a, -b), -self._both(-a, b))
+
+    def difference(self, a: Sequence[Literal], b: Sequence[Literal]) -> tuple[Literal, ...]:
+        """Return the bits of the difference of two numbers of as many bits, round."""
+        bits, carry = [], TRUE
+        for one, other in zip(a, b, strict=True):
+            half = self.same(one, other)  # of `one` and the opposite of `other`: one of them holds
+            bits.append(-self.same(half, carry))
+            carry = -self._both(-self._both(half, carry), -self._both(one, -other))
+        return tuple(bits)
 
     def given(self) -> list[dict[str, int]]:
         """Return what the environment gives in each cycle of the last model, by variable."""

@@ -22,8 +22,9 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.contract.watched import monitors
 from rcsc.compose.exact import explicit
-from rcsc.compose.exact.circuit import Circuit, circuit
+from rcsc.compose.exact.circuit import Circuit, circuit, roots_of
 from rcsc.compose.exact.eventual import Waits, of_all_states, of_short_runs
+from rcsc.compose.exact.shifted import numbers_above
 from rcsc.lang.model import (
     Apply,
     Bool,
@@ -137,7 +138,8 @@ def circuit_of(ts: TransitionSystem, stated: Property) -> Circuit | None:
     step, firsts = never.cycle(never.havoc()), tuple(never.firsts().values())
     if any(cycle.calls for cycle in (*firsts, step)):
         return None  # what an extern procedure gives is no input
-    return circuit(never, firsts, step, [owed])
+    numbers = numbers_above(never, step, *roots_of(step, [owed]))
+    return replace(circuit(never, firsts, step, [owed]), numbers=numbers)
 
 
 def never_waits(ts: TransitionSystem, stated: Property) -> tuple[TransitionSystem, Obligation]:
