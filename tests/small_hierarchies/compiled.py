@@ -5,7 +5,7 @@ were read. It is held against these: a part of the cycles of every enumeration i
 meaning of operators with the interpreter (`operator_table`), as every stage does.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -34,6 +34,7 @@ from rcsc.lang.model import (
     ReadLocal,
     Real,
     Select,
+    Single,
     Statement,
     Table,
     ToElement,
@@ -42,6 +43,7 @@ from rcsc.lang.model import (
     key_bounds,
     pending,
 )
+from rcsc.lang.operator_table import single
 
 State: TypeAlias = dict[str, Value]
 Answers: TypeAlias = Callable[[Procedure, list[Value]], tuple[Value, ...]]
@@ -75,17 +77,22 @@ class Compiled:
 
 def compiled(program: Program, level: Level, between: tuple[Expr, ...] = ()) -> Compiled:
     """The functions of a level; conditions `between` levels are stated last."""
-    writer = _Writer(program, level, between)
+    space = executed(program, Writer(program, level, between).written())
+    many = len(program.invariants) + len(program.properties) + len(between)
+    stated = tuple(space[f"stated_{at}"] for at in range(many))
+    return Compiled(space["run"], space["settle"], space["in_range"], stated)
+
+
+def executed(program: Program, lines: Iterable[str]) -> dict[str, Any]:
+    """Execute what a `Writer` wrote of a program; return its functions, by name."""
     space: dict[str, Any] = {
         **{f"op_{op.name}": op.meaning for op in Op},
         **{f"extern_{at}": procedure for at, procedure in enumerate(program.procedures)},
         **{f"variable_{at}": variable for at, variable in enumerate(program.variables)},
-        "admitted": _admitted, "ExternError": ExternError, "Fault": Fault, "at": _at,
+        "admitted": _admitted, "ExternError": ExternError, "Fault": Fault, "at": _at, "rounded": _rounded,
     }  # fmt: skip
-    exec(compile("\n".join(writer.written()), f"<{level.name}>", "exec"), space)  # noqa: S102  # made here
-    many = len(program.invariants) + len(program.properties) + len(between)
-    stated = tuple(space[f"stated_{at}"] for at in range(many))
-    return Compiled(space["run"], space["settle"], space["in_range"], stated)
+    exec(compile("\n".join(lines), f"<{program.name}>", "exec"), space)  # noqa: S102  # made here
+    return space
 
 
 def _at(leaves: Sequence[str], index: Value) -> str:
@@ -95,9 +102,17 @@ def _at(leaves: Sequence[str], index: Value) -> str:
     return leaves[at]
 
 
+def _rounded(value: Value) -> Value:
+    return single(value) if isinstance(value, float) else value
+
+
 @dataclass(slots=True)
-class _Writer:
-    """Writes the functions; `s` is the state, `r` takes what is read, `x` answers for extern procedures, `b` is the state before."""
+class Writer:
+    """Writes the functions; `s` is the state, `r` takes what is read, `x` answers for extern procedures, `b` is the state before.
+
+    Attributes:
+        states: Whether what is written next is of a state and the one before it, else of a cycle.
+    """
 
     program: Program
     level: Level
@@ -105,7 +120,7 @@ class _Writer:
     inputs: frozenset[str] = field(init=False)
     _places: dict[str, int] = field(init=False)
     _procedures: dict[str, int] = field(init=False)
-    _between: bool = False
+    states: bool = False
 
     def __post_init__(self) -> None:
         self.inputs = frozenset(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
@@ -121,17 +136,18 @@ class _Writer:
             yield from self._table(at, table)
         yield from self._run()
         yield from self._in_range()
-        self._between = True
+        self.states = True
         conditions = [invariant.condition for invariant in self.program.invariants]
         conditions += [stated.condition for stated in self.program.properties]
         conditions += self.between
         for at, condition in enumerate(conditions):
             yield f"def stated_{at}(s, b):"
-            yield f"  return bool({self._of(condition)})"
+            yield f"  return bool({self.of(condition)})"
 
     # --- expressions ---
 
-    def _of(self, expr: Expr) -> str:
+    def of(self, expr: Expr) -> str:
+        """Return the expression as Python."""
         match expr:
             case Literal(value=value):
                 return repr(value)
@@ -142,21 +158,21 @@ class _Writer:
             case Select(leaves=leaves, index=index):
                 return self._selected([str(leaf) for leaf in leaves], index)
             case Among(subject=subject, values=values):
-                return f"({self._of(subject)} in {tuple(values)!r})"
+                return f"({self.of(subject)} in {tuple(values)!r})"
             case Apply(op=op, args=args):
                 return self._applied(op, args)
 
     def _read(self, name: str) -> str:
-        if self._between:
+        if self.states:
             return f"b[{name.removeprefix(BEFORE)!r}]" if name.startswith(BEFORE) else f"s[{name!r}]"
         return f"(r.add({name!r}) or s[{name!r}])" if name in self.inputs else f"s[{name!r}]"
 
     def _selected(self, leaves: list[str], index: Expr) -> str:
         every = "".join(f"lambda: {self._read(leaf)}, " for leaf in leaves)
-        return f"at(({every}), {self._of(index)})()"
+        return f"at(({every}), {self.of(index)})()"
 
     def _applied(self, op: Op, args: tuple[Expr, ...]) -> str:
-        parts = [self._of(arg) for arg in args]
+        parts = [self.of(arg) for arg in args]
         if op is Op.AND:
             return f"(bool({parts[0]}) and bool({parts[1]}))"
         if op is Op.OR:
@@ -167,13 +183,14 @@ class _Writer:
             return f"(bool({parts[0]}) is not bool({parts[1]}))"
         if isinstance(args[0].type, Real):
             parts = [f"float({part})" for part in parts]
-        if op in _INFIX:
-            return f"({parts[0]} {_INFIX[op]} {parts[1]})"
-        return f"op_{op.name}({', '.join(parts)})"
+        text = (
+            f"({parts[0]} {_INFIX[op]} {parts[1]})" if op in _INFIX else f"op_{op.name}({', '.join(parts)})"
+        )
+        return f"rounded({text})" if isinstance(args[0].type, Single) else text
 
     def _kept(self, expr: Expr) -> str:
         """-0.0 is 0.0 wherever it is kept."""
-        return f"({self._of(expr)} + 0.0)" if isinstance(expr.type, Real) else self._of(expr)
+        return f"({self.of(expr)} + 0.0)" if isinstance(expr.type, Real) else self.of(expr)
 
     # --- statements ---
 
@@ -208,13 +225,13 @@ class _Writer:
                 if value is not None:
                     yield f"{indent}l_{name} = {self._kept(value)}"
             case If(condition=condition, then=then, orelse=orelse):
-                yield f"{indent}if {self._of(condition)}:"
+                yield f"{indent}if {self.of(condition)}:"
                 yield from self._body(then, deeper)
                 yield f"{indent}else:"
                 yield from self._body(orelse, deeper)
             case Case(subject=subject, arms=arms, orelse=orelse):
                 given = f"c{len(indent)}"
-                yield f"{indent}{given} = {self._of(subject)}"
+                yield f"{indent}{given} = {self.of(subject)}"
                 yield f"{indent}if False: pass"
                 for arm in arms:
                     yield f"{indent}elif {given} in {tuple(arm.values)!r}:"
@@ -233,7 +250,7 @@ class _Writer:
             case ToLeaf(name=name):
                 return f"s[{str(name)!r}]"
             case ToElement(leaves=leaves, index=index):
-                return f"s[at({tuple(map(str, leaves))!r}, {self._of(index)})]"
+                return f"s[at({tuple(map(str, leaves))!r}, {self.of(index)})]"
             case _:
                 return f"l_{place.name}"  # type: ignore[attr-defined]  # the only other one
 
@@ -244,7 +261,7 @@ class _Writer:
         yield "  pass"
         later = [(v, v.deferred_until) for v in self.program.variables if v.deferred_until is not None]
         for at, (_, until) in enumerate(later):
-            yield f"  ready{at} = {self._of(until)}"
+            yield f"  ready{at} = {self.of(until)}"
         for at, (v, _) in enumerate(later):
             yield f"  if ready{at}: s[{str(v.name)!r}] = s[{str(pending(v.name))!r}]"
         for name in self.level.preprocess:
@@ -255,12 +272,12 @@ class _Writer:
         yield "  failed = []"
         for assumption in self.program.assumptions:
             if assumption.name in table.assumptions:
-                yield f"  if not {self._of(assumption.condition)}: failed.append({str(assumption.name)!r})"
+                yield f"  if not {self.of(assumption.condition)}: failed.append({str(assumption.name)!r})"
         yield "  return frozenset(failed)"
         yield f"def matched_{number}(s, r):"
         yield "  found = []"
         for at, line in enumerate(table.lines):
-            tests = [f"bool({self._of(test.condition)})" for test in line.tests if test is not None]
+            tests = [f"bool({self.of(test.condition)})" for test in line.tests if test is not None]
             yield f"  if {' and '.join(tests) or 'True'}: found.append({at})"
         yield "  return found"
         lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
@@ -278,7 +295,7 @@ class _Writer:
             yield f"  return table_{places[self.level.tables.table]}"
         else:
             by = "".join(f"{value!r}: table_{places[name]}, " for value, name in self.level.tables.tables)
-            yield f"  return {{{by}}}[{self._of(self.level.tables.selector)}]"
+            yield f"  return {{{by}}}[{self.of(self.level.tables.selector)}]"
         yield "def answer(s, r, x):"
         yield "  pass"
         for name in self.level.postprocess:
