@@ -17,8 +17,8 @@ from multiprocessing import get_context
 from tests.judge.drawn import drawn
 from tests.judge.held import Judged, judged
 
-PART = 50
-"""Levels that a process judges in one go."""
+PART, TOLD = 50, 1_000
+"""Levels that a process judges in one go, and after how many of them it is told how far it is."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -42,6 +42,12 @@ def main(arguments: list[str] | None = None) -> int:
             for difference in one.differences:
                 wrong += 1
                 print(f"seed {one.seed}: {difference}", flush=True)
+        if (part[-1].seed + 1 - given.seed) % TOLD == 0:
+            levels, seconds = counts["levels"], time.perf_counter() - begun
+            print(
+                f"up to seed {part[-1].seed}: {wrong} differences in {levels:,} levels, {seconds:.0f} s",
+                flush=True,
+            )
     _report(counts, left_open, wrong, time.perf_counter() - begun)
     return int(wrong > 0)
 
