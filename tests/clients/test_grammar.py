@@ -147,6 +147,7 @@ requirement af : at most 2 times in 3 [s], b
 requirement ag : at least 3 cycles apart, b
 requirement ah : on for at least 3 cycles, b
 requirement ai : off for at least 3 [s], b
+requirement aj : always a for 3 cycles and b
 procedure f(x : int 0 .. 3) { local y : bool := max(1, 2) = 2 if a { b := 1 }
 else { for i in 0 .. 3 { next c := d } } case a { 1 { b := 2 } } }
 module g reads a writes b { b := count(a) }
