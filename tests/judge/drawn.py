@@ -117,12 +117,13 @@ def made(seed: int) -> tuple[str, frozenset[str]]:
     """Draw a level; return its text, and the kinds of its parts."""
     random = Random(seed)  # noqa: S311  # repeatable on purpose
     it = Drawn(random, random.choice((1, 2, 2, 3, 4)))
+    it.has("assumed", 0.35)
     it.declared += [
         "input a : bool",
         "input b : bool",
         f"state n : int 0 .. 3{it.begun(0, 3)}",
         "state s : bool",
-        "output o : bool",
+        f"output o : bool{_safe(it)}",
     ]
     reads, writes = _states(it)
     head = f"module work reads {', '.join(reads)} writes {', '.join(writes)} {{"
@@ -133,6 +134,11 @@ def made(seed: int) -> tuple[str, frozenset[str]]:
 
 
 # --- states -----------------------------------------------------------------------------------
+
+
+def _safe(it: Drawn) -> str:
+    """Draw a value that the output shows where a cycle is refused."""
+    return f" safe {it.random.choice(('true', 'false'))}" if it.has("safe", 0.15) else ""
 
 
 def _states(it: Drawn) -> tuple[list[str], list[str]]:
@@ -236,7 +242,7 @@ def _says(random: Random) -> str:
 
 
 def _assumed(it: Drawn) -> Iterator[str]:
-    if not it.has("assumed", 0.3):
+    if "assumed" not in it.parts:
         return
     for at in range(it.random.choice((1, 1, 2))):
         says = it.random.choice(_ASSUMED)

@@ -12,7 +12,7 @@ from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.lasso import Lasso, waiting_lasso
-from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, traces
 from rcsc.compose.exact import explicit
 from rcsc.compose.exact.bounded import looked
 from rcsc.compose.exact.circuit import circuit
@@ -190,7 +190,13 @@ def _shown(held: _Held) -> Iterator[str]:
     lengths = {key[2]: len(trace.steps) for key, trace in found.items() if isinstance(trace, Trace)}
     held.counts["runs shown"] += len(lengths)
     least = {name: cycles for name, cycles in held.true.least.items() if cycles <= SHORT}
-    if lengths != least:
+    guessed = {
+        key[2] for key, trace in found.items() if isinstance(trace, NotReproducedError) and trace.guessed
+    }
+    held.open += [f"run of {name}" for name in sorted(guessed)]  # the arithmetic of singles is left open
+    if any(least.get(name) != cycles for name, cycles in lengths.items()) or set(least) - guessed - set(
+        lengths
+    ):
         yield f"runs shown: {lengths} for {least}"
     for name in waiting(held.ts):
         lasso = waiting_lasso(held.ts, name, (TraceSearch(6), TraceSearch(6, restarted=True)))

@@ -16,7 +16,7 @@ from tests.judge.held import judged
 from tests.judge.truth import Runs, truth
 from tests.support.programs.systems import alone
 
-SEEDS = (2, 11, 12, 14)
+SEEDS = (2, 8, 9, 14)
 """Levels that are quickly proved; of one lines and requirements are looked at in context, too."""
 
 
@@ -37,7 +37,7 @@ def test_nearly_every_level_is_a_program_and_every_part_is_drawn() -> None:
     parts = Counter(part for seed in range(200) for part in made(seed)[1])
     assert set(parts) == {
         "arithmetic", "array", "assumed", "clamped", "deferred", "division", "enumeration", "input", "property", "refused", "restart",
-        "single", "timer",
+        "safe", "single", "timer",
     }  # fmt: skip
     assert min(parts.values()) > 3
     assert all(isinstance(compile_text(drawn(seed), "x"), Program) for seed in range(20))
@@ -82,8 +82,8 @@ def never(*_: object) -> Waits:
 @pytest.mark.parametrize(
     ("place", "fault", "seed"),
     [
-        ("rcsc.compose.contract.transition.kept", forgetful, 107),
-        ("tests.judge.held.of_all_states", never, 13),
+        ("rcsc.compose.contract.transition.kept", forgetful, 42),
+        ("tests.judge.held.of_all_states", never, 14),
     ],
 )
 def test_faults_are_noticed(place: str, fault: Callable[..., object], seed: int) -> None:
@@ -93,7 +93,7 @@ def test_faults_are_noticed(place: str, fault: Callable[..., object], seed: int)
 
 
 def test_a_campaign_goes_on_where_another_ended(capsys: pytest.CaptureFixture[str]) -> None:
-    for seed, count in ((11, 1), (12, 2), (11, 3)):
+    for seed, count in ((8, 1), (9, 2), (8, 3)):
         assert main(["--seed", str(seed), "--count", str(count), "--proofs", "100"]) == 0
     lines = [line for line in capsys.readouterr().out.splitlines() if line.endswith("  states")]
     first, second, both = (int(line.split()[0].replace(",", "")) for line in lines)

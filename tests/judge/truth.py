@@ -88,12 +88,14 @@ class Runs:
         run: A cycle, which changes the state in place.
         stated: What is stated of it, by name; `watch`, of each a function that steps its monitor in the state after a cycle, which is given
             with the one before it.
+        safe: What outputs show where a cycle is refused.
     """
 
     ts: TransitionSystem
     run: Callable[..., Any]
     stated: dict[str, Property]
     watch: dict[str, Callable[[State, State], Watched]]
+    safe: State
 
     @classmethod
     def of(cls, ts: TransitionSystem) -> "Runs":
@@ -107,7 +109,8 @@ class Runs:
             lines += [f"def watch_{at}(s, b):", *_watching(writer, one.monitor, one.condition)]
         space = executed(program, lines)
         watch = {name: space[f"watch_{at}"] for at, name in enumerate(stated)}
-        return cls(ts, space["run"], stated, watch)
+        safe: State = {str(v.name): v.safe for v in program.variables if v.safe is not None}
+        return cls(ts, space["run"], stated, watch, safe)
 
     def begun(self) -> State:
         """Return the state before the first cycle."""
@@ -158,7 +161,9 @@ class Runs:
         """Run a cycle, and the monitors after it, in the order of `watch`."""
         came, took = taken
         after = {**before, **(came if took is None else took)}
-        if took is not None:
+        if took is None:
+            after.update(self.safe)
+        else:
             fault = self.run(after, _READ, None)[2]
             assert fault is Fault.OK, fault
         return after, [watch(after, before) for watch in self.watch.values()]
