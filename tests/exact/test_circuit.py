@@ -108,3 +108,36 @@ def test_the_difference_of_two_numbers_is_taken_round() -> None:
         a, b = ([TRUE if number >> at & 1 else FALSE for at in range(3)] for number in (one, other))
         difference = [TRUE if (one - other) >> at & 1 else FALSE for at in range(3)]
         assert run.difference(a, b) == tuple(difference)
+
+
+def test_what_is_narrowed_is_told_apart_by_the_same_constants() -> None:
+    """Where a cycle knows that a value lies between two others it still looks at the same variable."""
+    kind = Int(0, 100)
+    read = values.variable("x", kind)
+    nodes = [values.compare(Op.LT, values.narrowed(read, 2, 90), values.constant(kind, 5))]
+    assert points_of(nodes)["x"] == points(kind, (Op.LT, 5))
+
+
+COUNTS = """\
+input a : bool
+state n : int 0 .. 3
+module count reads a, n writes n { n := min(n + int(a), 3) }
+table t {
+| line | n ||
+|---|---||
+| any | ||
+}
+property few : n < 3
+level solo { period 40 [ms] preprocess count table t }
+"""
+
+
+def test_a_truth_is_a_number_of_one_bit() -> None:
+    ts = alone(COUNTS)
+    step = ts.cycle(ts.havoc())
+    made = circuit(
+        ts, tuple(ts.firsts().values()), step, [one for one in obligations(ts, step) if one.name == "few"]
+    )
+    assert made.opened == ()
+    [run] = explicit.explored(made).runs.values()
+    assert len(run.given) == 3

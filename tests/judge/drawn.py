@@ -41,6 +41,7 @@ _SUMS = (
     "(k + n) mod 4",
     "abs(k - n)",
     "(k * n + 1) mod 4",
+    "min(k + int(a), 3)",
     "min(k * k, 3)",
     "count(a, b, s)",
     "n",
@@ -49,9 +50,9 @@ _DIVIDED = (
     "(k + 4) / (n + 2)",
     "n mod (k + 1)",
     "7 / (k + 2)",
-    "(n - k) mod 3 + 1",
+    "abs((n - k) mod 3) + 1",
     "min((n * 5 - k) / 3 + 1, 3)",
-    "9 mod (n + 2)",
+    "9 mod (n + 1)",
 )
 _SINGLES = (
     "min(f + 0.5, 1.0)",

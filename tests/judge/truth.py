@@ -85,7 +85,7 @@ class Runs:
     """A level as functions.
 
     Attributes:
-        run: A cycle, which changes the state in place.
+        run: A cycle, which changes the state in place; `in_range`, whether each value is.
         stated: What is stated of it, by name; `watch`, of each a function that steps its monitor in the state after a cycle, which is given
             with the one before it.
         safe: What outputs show where a cycle is refused.
@@ -93,6 +93,7 @@ class Runs:
 
     ts: TransitionSystem
     run: Callable[..., Any]
+    in_range: Callable[[State], bool]
     stated: dict[str, Property]
     watch: dict[str, Callable[[State, State], Watched]]
     safe: State
@@ -110,7 +111,7 @@ class Runs:
         space = executed(program, lines)
         watch = {name: space[f"watch_{at}"] for at, name in enumerate(stated)}
         safe: State = {str(v.name): v.safe for v in program.variables if v.safe is not None}
-        return cls(ts, space["run"], stated, watch, safe)
+        return cls(ts, space["run"], space["in_range"], stated, watch, safe)
 
     def begun(self) -> State:
         """Return the state before the first cycle."""
@@ -266,6 +267,9 @@ def truth(runs: Runs, *, refused: bool = False) -> Truth:
                     key = tuple(after.values())
                     target = places.get(key)
                     if target is None:
+                        assert runs.in_range(after) or refused, (
+                            "the level is drawn wrongly: a value is out of range"
+                        )
                         target = places[key] = len(places)
                         following.append(after)
                     for at, (kept, waiting, asks) in enumerate(watched):

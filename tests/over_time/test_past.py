@@ -217,6 +217,26 @@ def test_what_is_on_or_off_stays_so_for_a_time(cycles: int, on: bool) -> None:  
         assert broken_at(watch, trace) == (short[0] if short else None), trace
 
 
+@pytest.mark.parametrize(
+    ("asks", "asked", "given", "broken"),
+    [
+        ("whenever a, ", {1, 2}, {5}, 5),
+        ("whenever a, ", {1, 2}, {4}, 4),
+        ("whenever a, ", {1, 2}, {3, 4, 5}, None),
+        ("whenever a, ", {1, 2}, {6}, None),
+        ("", set(), {3}, 3),
+        ("", set(), {2, 3}, None),
+    ],
+)
+def test_each_cycle_that_asks_is_remembered(
+    asks: str, asked: set[int], given: set[int], broken: int | None
+) -> None:
+    """By hand, outside of the scope: what is asked for does not come first when two cycles are over, of any cycle that asks."""
+    watch = watched(f"only while n > 1, {asks}exactly after 2 cycles, b")
+    trace = [{"a": at in asked, "b": at in given, "n": 0} for at in range(8)]
+    assert broken_at(watch, trace) == broken
+
+
 @pytest.mark.parametrize("scope", ["", "while b, ", "after b, "])
 def test_what_comes_only_after_something_else(scope: str) -> None:
     random = Random(scope)  # noqa: S311  # the same each time

@@ -82,8 +82,6 @@ class Gates(Bits):
         left, right = node.args[0], node.args[-1]
         if any(isinstance(kind, Real) for kind in (left.kind, node.kind)):
             return super(Gates, self)._number(op, node, parts)
-        if op is Op.TO_INT and isinstance(left.kind, Bool):
-            return (parts[0][0], FALSE)
         if op is Op.MUL and not (left.known or right.known):
             return self._times(*parts)
         if op in (Op.DIV, Op.MOD) and not (wraps_once(node) or takes_bits(node)):
