@@ -58,7 +58,7 @@ MODULES = tuple(
         "proof/solvers/": "search smt",
         "compose/proof/": "assume_guarantee context termination level ranking system",
         "compose/contract/": "claims environment obligations properties transition watched",
-        "compose/exact/": "circuit",
+        "compose/exact/": "circuit shifted",
         "compose/invariant/": "confirm",
     }.items()
     for name in names.split()

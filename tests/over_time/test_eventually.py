@@ -258,6 +258,52 @@ def test_numbers_that_are_told_apart_do_not_go_on(which: str, tmp_path: Path) ->
     assert ordered(taking(tmp_path, which)) == set()
 
 
+READS = ("receive reads command,", "receive reads there, command,")
+ODD = "odd := command.inc_command mod 2 = 1\n  new_command :="
+
+
+@pytest.mark.parametrize(
+    ("edits", "stated"),
+    [
+        (
+            (
+                READS,
+                (
+                    TAKES[0],
+                    "if there { inc_command_seen := 0 } else { inc_command_seen := command.inc_command }",
+                ),
+            ),
+            "",
+        ),
+        (
+            (
+                READS,
+                (
+                    TAKES[0],
+                    "if there { inc_command_seen := command.inc_command } else { inc_command_seen := 0 }",
+                ),
+            ),
+            "",
+        ),
+        ((), "property odd : command.inc_command mod 2 = 1 or there"),
+        (
+            (
+                ("state new_command : bool", "state new_command : bool\nstate odd : bool"),
+                ("writes new_command,", "writes odd, new_command,"),
+                ("new_command :=", ODD),
+            ),
+            "property was_odd : was odd or there",
+        ),
+    ],
+)
+def test_numbers_that_are_told_apart_anywhere_do_not_go_on(
+    edits: tuple[tuple[str, str], ...], stated: str, tmp_path: Path
+) -> None:
+    """By what they are set to, by what is asked of a cycle alone, or by what another state keeps of them."""
+    text = small_text("lower", *edits) + f"\n{stated}\n"
+    assert ordered(small_level(tmp_path, "lower", lower=text)) == set()
+
+
 def ordered(ts: TransitionSystem) -> frozenset[str]:
     """Return the leaves whose numbers may go on, of all that its obligations depend on."""
     step = ts.cycle(ts.havoc())
