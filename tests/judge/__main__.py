@@ -1,8 +1,12 @@
 """Many drawn levels: `python -m tests.judge --count 10000 --seed 0 --jobs 1`.
 
 Seeds are numbers: those from `--seed` on, `--count` of them, so that a run goes on where another one ended. Prints what was compared, by
-kind, and each difference with its seed; `--show SEED` prints a level. A proof takes ten times as long as the engines that search states:
-`--proofs K` proves one level of K, and holds those alone against all runs of the others. Exit status 1 where something differs.
+kind, and each difference with its seed, also where Ctrl-C ends it; `--show SEED` prints a level. A proof takes several times as long as
+the engines that search states: `--proofs K` proves one level of K, and holds those alone against all runs of the others. Exit status 1
+where something differs.
+
+Never drawn: neighbours and protocols (`tests.hierarchies` does), extern procedures, several tables of a level, DEFAULT lines, doubles,
+records, masks, invariants, assumptions that stop a cycle, long times.
 """
 
 import argparse
@@ -11,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from functools import partial
 from multiprocessing import get_context
 
@@ -34,20 +39,21 @@ def main(arguments: list[str] | None = None) -> int:
         print(drawn(given.show), judged(given.show), sep="\n")
         return 0
     begun, counts, wrong, left_open = time.perf_counter(), Counter[str](), 0, list[int]()
-    for part in _judged(given.seed, given.count, given.jobs, given.proofs):
-        for one in part:
-            counts += one.counts
-            counts["levels with a claim left open"] += bool(one.open)
-            left_open += [one.seed] if one.open else []
-            for difference in one.differences:
-                wrong += 1
-                print(f"seed {one.seed}: {difference}", flush=True)
-        if (part[-1].seed + 1 - given.seed) % TOLD == 0:
-            levels, seconds = counts["levels"], time.perf_counter() - begun
-            print(
-                f"up to seed {part[-1].seed}: {wrong} differences in {levels:,} levels, {seconds:.0f} s",
-                flush=True,
-            )
+    with suppress(KeyboardInterrupt):  # what was done until then is told
+        for part in _judged(given.seed, given.count, given.jobs, given.proofs):
+            for one in part:
+                counts += one.counts
+                counts["levels with a claim left open"] += bool(one.open)
+                left_open += [one.seed] if one.open else []
+                for difference in one.differences:
+                    wrong += 1
+                    print(f"seed {one.seed}: {difference}", flush=True)
+            if (part[-1].seed + 1 - given.seed) % TOLD == 0:
+                levels, seconds = counts["levels"], time.perf_counter() - begun
+                print(
+                    f"up to seed {part[-1].seed}: {wrong} differences in {levels:,} levels, {seconds:.0f} s",
+                    flush=True,
+                )
     _report(counts, left_open, wrong, time.perf_counter() - begun)
     return int(wrong > 0)
 
