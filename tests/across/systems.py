@@ -163,7 +163,7 @@ class Running:
         for tick in range(most):
             after = []
             for _, kept in here:
-                for values, anew in product(given, again if tick else again[:1]):
+                for values, anew in product(given, again):
                     due = [
                         self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels
                     ]

@@ -213,7 +213,9 @@ def test_what_only_a_refusal_breaks_is_proved_trusting_that_none_comes(tmp_path:
 def test_what_is_assumed_of_a_party_over_time_is_kept_by_every_run(tmp_path: Path) -> None:
     calm = "assume calm assumed : never panel.wish = r\n"
     never = "requirement never_right : never right.runs\n"
-    assert _answers(_written(tmp_path, calm + never))["never_right"].proved
+    found = _answers(_written(tmp_path, calm + never))["never_right"]
+    assert found.proved
+    assert found.trusts({}) == ("assumption `calm` across levels, as it is declared",)
     assert _answers(_written(tmp_path, never))["never_right"].refuted
 
 
@@ -241,6 +243,22 @@ def _said(found: Across) -> str:
     if found.proved:
         return "proved under any timing" if found.timing is Timing.ANY else "proved as scheduled"
     return f"refuted in tick {len(found.run)}"
+
+
+def test_nothing_is_proved_of_an_environment_that_cannot_go_on(tmp_path: Path) -> None:
+    never = "".join(
+        f"assume no_{side} assumed : never panel.wish = {side}\n" for side in ("nobody", "l", "r")
+    )
+    found = _answers(_written(tmp_path, never + "requirement any : never right.runs\n"))["any"]
+    assert not found.proved
+    assert found.stuck
+
+
+def test_an_assumption_that_is_kept_for_a_while_only_proves_nothing(tmp_path: Path) -> None:
+    stays = "assume stays assumed : after panel.wish = l, never panel.wish = r\n"
+    moves = "assume moves assumed : when panel.wish = l, exactly after 3 cycles, panel.wish = r\n"
+    found = _answers(_written(tmp_path, stays + moves + "requirement any : never right.runs\n"))["any"]
+    assert not found.proved
 
 
 # --- words -------------------------------------------------------------------------------------
@@ -300,6 +318,18 @@ def test_prove_tells_requirements_first_with_timing_levels_and_runs(tmp_path: Pa
     every = {one["name"]: one for one in json.loads(out)["requirements"]}
     assert (every["never_both"]["verdict"], every["soon"]["verdict"]) == ("proved", "refuted")
     assert len({row["tick"] for row in every["soon"]["time_line"]}) == 5
+
+
+def test_show_prints_a_run_of_all_levels_that_asks(tmp_path: Path, rcsc: Rcsc) -> None:
+    asks = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
+    never = "requirement idle : when boss.go_left and boss.go_right, within 1 cycles, left.runs\n"
+    path = _written(tmp_path, asks + never)
+    status, out, _ = rcsc("prove", path, "--show", "obeys")
+    assert status == 0
+    assert out.startswith("requirement `obeys` across levels asks in cycle 1\n")
+    assert "! it asks" in out
+    assert rcsc("prove", path, "--show", "idle")[0] == 1
+    assert rcsc("prove", path, "--show", "other")[0] == 2
 
 
 def test_a_proof_is_kept_and_a_changed_requirement_is_asked_anew(tmp_path: Path, rcsc: Rcsc) -> None:

@@ -39,7 +39,14 @@ def answered(question: Question, cache: Cache | None) -> Across:
     if kept is not None:
         around = Surroundings(kept.refuses, kept.restarts)
         return Across(
-            question.stated, True, Timing(kept.timing), kept.levels, kept.by, around, vacuous=kept.vacuous
+            question.stated,
+            True,
+            Timing(kept.timing),
+            kept.levels,
+            kept.by,
+            around,
+            vacuous=kept.vacuous,
+            assumed=question.assumed,
         )
     cut_before = smt.cut_short()
     found = question.answer()

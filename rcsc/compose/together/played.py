@@ -81,7 +81,7 @@ class Playing:
         if not asked.due:
             return None
         if asked.anew:
-            before, self.found[name] = begun_anew(self.ts, name, before, taken), None
+            before, self.found[name] = begun_anew(self.ts, name, before, taken, first=asked.first), None
         if asked.refused:
             leaf = _refused(member)
             taken[leaf] = refused(member.program.variable(leaf))
@@ -109,8 +109,8 @@ def _refused(member: TransitionSystem) -> str:
     return min(member.refusable, key=lambda leaf: leaf in selects)
 
 
-def begun_anew(ts: Together, name: str, stood: State, taken: State) -> State:
-    """Return the state in which a level begins anew, as `run.adopt.restart` makes it."""
+def begun_anew(ts: Together, name: str, stood: State, taken: State, *, first: bool) -> State:
+    """Return the state in which a level begins anew, as `run.adopt.restart` makes it; at first its buffers are empty."""
     program = ts.members[name].program
     start = {**initial(program), **taken}
     for leaf, adopted in program.adopted.items():
@@ -121,8 +121,8 @@ def begun_anew(ts: Together, name: str, stood: State, taken: State) -> State:
                 start[leaf] = start[other]
             case Stands():
                 start[leaf] = stood[leaf]
-            case After():
-                start[leaf] = (int(stood[leaf]) + 1) % NUMBERS
+            case After(echo):
+                start[leaf] = (int(start[echo] if first else stood[leaf]) + 1) % NUMBERS
     return start
 
 

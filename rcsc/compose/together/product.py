@@ -181,12 +181,12 @@ class Together(TransitionSystem):
         for name, ts in self.members.items():
             due[name] = self._due(name, before, suffix)
             restarts[name] = FALSE
-            if self.restarting and not first:  # before a cycle of it: what it gave last stands until then
+            if self.restarting:  # before a cycle of it: what it gave last stands until then
                 restarts[name] = values.variable(f"{name} begins anew{suffix}", Bool())
             taken = self._taken(name, before, suffix, first=first)
             takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in self.wired}
             stood = {leaf: before[f"{name}.{leaf}"] for leaf in ts.kinds}
-            start = _or(restarts[name], self._anew(name, stood, taken, suffix), stood)
+            start = _or(restarts[name], self._anew(name, stood, taken, suffix, first=first), stood)
             cycles[name] = ts.cycle(start, f" of {name}{suffix}", taken)
             ended = _or(due[name], cycles[name].after, stood)
             nothing = values.both(restarts[name], cycles[name].untaken)  # taken, since it began anew
@@ -214,10 +214,11 @@ class Together(TransitionSystem):
             refuses={name: each.untaken for name, each in cycles.items()},
         )  # fmt: skip
 
-    def _anew(self, name: str, stood: Leaves, taken: Leaves, suffix: str) -> Leaves:
+    def _anew(self, name: str, stood: Leaves, taken: Leaves, suffix: str, *, first: bool) -> Leaves:
         """Return the state in which a level begins anew (`run.adopt.restart`).
 
-        As scheduled its buffers hold what it gave last, and what it takes. Else they hold something, as far as the contract goes.
+        As scheduled its buffers hold what it gave last, and what it takes; at first they are empty. Else they hold something, as far as the
+        contract goes.
         """
         ts, scheduled = self.members[name], self.timing is Timing.SCHEDULED
 
@@ -235,6 +236,7 @@ class Together(TransitionSystem):
                 case Stands():
                     start[leaf] = late
                 case After(echo):
+                    late = start[echo] if scheduled and first else late
                     next_one = successor(late)
                     echoed = values.equal(late, start[echo])
                     start[leaf] = next_one if scheduled else values.choice(echoed, next_one, late)

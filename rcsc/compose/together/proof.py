@@ -18,10 +18,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract.claims import RUNS, Closed, Need
-from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.claims import DECLARED, RUNS, UNKNOWN, Closed, Need, Verdict
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
+from rcsc.compose.contract.watched import can_be_kept
 from rcsc.compose.exact.bounded import looked
 from rcsc.compose.exact.circuit import circuit
 from rcsc.compose.exact.portfolio import helped
@@ -77,6 +78,8 @@ class Across:
         run: A run that breaks it, tick by tick, in the surroundings `broken_in`.
         looked: No run of so many ticks breaks it there, where none is shown.
         vacuous: Whether it is proved, too, that nothing ever asks for its response.
+        assumed: The assumptions across levels that it may rest on.
+        stuck: Whether it is open because what is assumed across levels was not shown to be kept for ever.
     """
 
     stated: Property
@@ -89,6 +92,8 @@ class Across:
     broken_in: Surroundings | None = None
     looked: int = 0
     vacuous: bool = False
+    assumed: tuple[str, ...] = ()
+    stuck: bool = False
 
     @property
     def refuted(self) -> bool:
@@ -100,12 +105,11 @@ class Across:
         refused = (
             () if self.around.refuses else (said for name in self.levels for said in admitted(systems[name]))
         )
-        return (*refused, *(() if self.around.restarts else (NO_RESTART,)))
+        assumed = (f"assumption `{name}` across levels{DECLARED}" for name in self.assumed)
+        return (*assumed, *refused, *(() if self.around.restarts else (NO_RESTART,)))
 
     def closed(self, systems: Mapping[str, TransitionSystem], claims: Mapping[Need, Closed]) -> Closed:
         """Return its verdict with all that it rests on, as claims about levels have it."""
-        from rcsc.compose.contract.claims import UNKNOWN, Verdict
-
         rests = {(name, RUNS): claims.get((name, RUNS), UNKNOWN) for name in self.levels}
         lacks = {need for need, each in rests.items() if not each.accepted}
         lacks |= {other for each in rests.values() for other in each.lacks}
@@ -137,19 +141,30 @@ class Question:
         """The levels that it names, and all that write to these, directly or not."""
         return tuple(self._reached_from(self._named(), len(self.systems)))
 
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """The assumptions across levels that speak of these levels and of who stands outside them."""
+        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
+        return tuple(one.name for one in ts.program.environment)
+
     def answer(self) -> Across:
         """Prove it or refute it; where it is proved, tell whether anything ever asks for its response."""
         found = self.verdict()
         monitor = self.stated.monitor
         if not found.proved or monitor is None or monitor.asks == TRUE:
             return found
-        never = replace(self.stated, condition=negation(monitor.asks))
+        return replace(found, vacuous=self.asks().proved)
+
+    def asks(self) -> Across:
+        """Answer whether nothing ever asks for its response; what refutes that is a run that does."""
+        assert self.stated.monitor is not None
+        never = replace(self.stated, condition=negation(self.stated.monitor.asks))
         program = replace(self.program, properties=(never,))
-        return replace(found, vacuous=replace(self, program=program, stated=never).verdict().proved)
+        return replace(self, program=program, stated=never).verdict()
 
     def verdict(self) -> Across:
         """Prove it or refute it."""
-        found = Across(self.stated, levels=self.every)
+        found = Across(self.stated, levels=self.every, assumed=self.assumed, stuck=self._is_stuck())
         left = list[Surroundings]()
         for around in self._surroundings():
             if run := self._run(around, SHORT):
@@ -177,7 +192,7 @@ class Question:
     def _as_proved(
         found: Across, timing: Timing, names: tuple[str, ...], around: Surroundings, by: str
     ) -> Across:
-        return replace(found, proved=True, timing=timing, levels=names, around=around, by=by)
+        return replace(found, proved=True, stuck=False, timing=timing, levels=names, around=around, by=by)
 
     # --- proofs ---
 
@@ -244,6 +259,12 @@ class Question:
         ts = together(systems, names, self.system, self.program, timing, self.stated.name)
         return replace(ts, restarting=around.restarts)
 
+    def _is_stuck(self) -> bool:
+        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
+        return bool(ts.program.environment) and not goes_on(
+            ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc())
+        )
+
     # --- runs ---
 
     def _run(self, around: Surroundings, most: int) -> Ticks:
@@ -276,6 +297,8 @@ def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -
     step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, step)
     assert len(wanted) == 1, "nothing would be proved of nothing"
+    if not goes_on(ts, firsts, step):
+        return None
     owed = [*(obligations(ts, first) for first in firsts), wanted]
     known = tuple(of_member(one, lemma.level) for lemma in lemmas for one in lemma.predicates)
     chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
@@ -291,6 +314,27 @@ def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -
             confirm_owed(found, firsts, step, owed, LIMITS, known=held, exact=integers)
             return by
     return None
+
+
+def goes_on(ts: Together, firsts: Sequence[Cycle], step: Cycle) -> bool:
+    """Return whether what is assumed across levels can always be kept: of an environment that cannot go on all would be proved."""
+    if not ts.program.environment:
+        return True
+    owed = [
+        tuple(Obligation(Sort.KEPT, "", name, holds) for name, holds in can_be_kept(ts.program, cycle.after))
+        for cycle in (*firsts, step)
+    ]
+    at_first = [holds for first in firsts for _, holds in can_be_kept(ts.program, first.before)]
+    if not all(holds.known and holds.low for holds in at_first):
+        return False
+    chosen = unlike(features(ts, step, [one.holds for one in owed[-1]]))
+    found = _searched((*firsts, step), owed, chosen, ())
+    if found.open:
+        return False
+    with suppress(NotConfirmedError, GaveUpError):
+        confirm_owed(found, tuple(firsts), step, owed, LIMITS)
+        return True
+    return False
 
 
 def _clauses(ts: Together, chosen: Sequence[Predicate], lemmas: Iterable[Lemma]) -> Iterator[Clause]:

@@ -19,13 +19,15 @@ from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, Across, Question
-from rcsc.compose.together.repeated import repeated
+from rcsc.compose.together.repeated import finding_of, repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
 from rcsc.front.commands.shared.stopped import attach, say_error
-from rcsc.front.commands.systems.explained import say_run
+from rcsc.front.commands.systems.explained import say_exercise, say_run
 from rcsc.lang.project import Loaded
 
+_WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
+_FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
 _TIMINGS = {Timing.ANY: "under any timing", Timing.SCHEDULED: "as scheduled"}
 
 
@@ -74,6 +76,8 @@ def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found:
     if not found.proved:
         if found.refuted:
             return f"refuted in tick {len(found.run)}, {_TIMINGS[found.timing]}, by a run of {levels}"
+        if found.stuck:
+            return "not proved: what is assumed across levels was not shown to be kept for ever"
         return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
     closed = found.closed(systems, whole.closed)
     where = f"{_TIMINGS[found.timing]}, of {levels}{f', {found.by}' if found.by else ''}"
@@ -113,9 +117,7 @@ def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
                 say_error(Code.NOT_COMPOSED, f"requirement `{found.stated.name}` across levels: not proved")
                 attach("note", f"it says: {found.stated.text}")
                 attach("note", f"no run of {counted(found.looked, 'tick')} breaks it; a longer one may")
-                attach(
-                    "help", "a requirement, or an invariant of a level, that says why it holds may show it"
-                )
+                attach("help", _FREER if found.stuck else _WHY)
             continue
         if found.proved:
             say_error(
@@ -127,6 +129,25 @@ def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
             say_error(Code.NOT_COMPOSED, f"requirement `{found.stated.name}` across levels: refuted")
         attach("note", f"it says: {found.stated.text}")
         say_run(systems, explanation)
+
+
+def shows(systems: Mapping[str, TransitionSystem], settings: TraceSettings, name: str) -> bool | None:
+    """Print a run that asks for the response of a requirement across levels; False where none was found, None where there is none."""
+    stated = stated_across(settings.system, {level: ts.program for level, ts in systems.items()})
+    program = None if stated is None else stated[0]
+    wanted = [
+        one
+        for one in ([] if program is None else program.properties)
+        if one.name == name and one.monitor is not None
+    ]
+    if program is None or not wanted:
+        return None
+    asking = Question(systems, settings.system, program, wanted[0]).asks()
+    if not asking.run:
+        click.echo(f"requirement `{name}` across levels: no run was found that asks for its response")
+        return False
+    say_exercise(systems, finding_of(asking), f"`{name}` across levels")
+    return True
 
 
 def as_json(

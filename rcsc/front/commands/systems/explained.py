@@ -359,11 +359,11 @@ def _unbroken(text: str) -> str:
     return text.replace(" ", _HARD) if len(text) <= _LONG else text
 
 
-def say_exercise(systems: Mapping[str, TransitionSystem], finding: Finding, name: str) -> None:
+def say_exercise(systems: Mapping[str, TransitionSystem], finding: Finding, whose: str) -> None:
     """Print a run that asks for the response of a requirement, and in which cycle it does."""
     *before, last = _run(systems, finding)
     begins = ", after a restart" if finding.restarted else ""
-    click.echo(f"requirement `{name}` of level `{finding.level}` asks in cycle {finding.broken_at}{begins}")
+    click.echo(f"requirement {whose} asks in cycle {finding.broken_at}{begins}")
     _say_time_line((*before, replace(last, wrong="it asks")), err=False)
 
 

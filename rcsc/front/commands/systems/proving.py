@@ -196,7 +196,9 @@ def shown_by_runs(path: Path, names: tuple[str, ...], length: int | None) -> int
             for stated in ts.program.properties
             if stated.monitor is not None and stated.name == plain and level in {"", owner}
         ]
-        if not places:
+        if not places and (found := across.shows(systems, settings, name)) is not None:
+            status = status if found else 1
+        elif not places:
             raise click.UsageError(f"no level has a requirement over time `{name}`")
         for ts, stated in places:
             finding = exercising(ts, stated, settings)
@@ -206,7 +208,7 @@ def shown_by_runs(path: Path, names: tuple[str, ...], length: int | None) -> int
                 )
                 status = 1
             else:
-                say_exercise(systems, finding, stated.name)
+                say_exercise(systems, finding, f"`{stated.name}` of level `{finding.level}`")
     return status
 
 
