@@ -46,7 +46,7 @@ def test_every_code_is_explained_and_most_by_example() -> None:
     runs = {
         code for code in without if code.value[3] in "679"
     }  # no text of a table shows its tests, a recorded run, or a bug in rcsc
-    assert len(without - runs) <= 17
+    assert len(without - runs) <= 18
     assert {code.value[3] for code in without} >= {"9"}
 
 

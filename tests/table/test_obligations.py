@@ -433,9 +433,9 @@ def test_a_solver_that_breaks_proves_nothing(monkeypatch: pytest.MonkeyPatch, er
     def broken(*_: object) -> None:
         raise z3.Z3Exception(b"out of memory") if error == "z3" else MemoryError
 
-    for method in ("check", "add"):
+    for where, name in ((z3.Solver, "check"), (z3, "Z3_solver_assert")):
         with monkeypatch.context() as patch:
-            patch.setattr(z3.Solver, method, broken)
+            patch.setattr(where, name, broken)
             found = verdict_of(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
         assert found.proved is None
         assert codes(found.findings) == ["RCS409"]

@@ -1066,14 +1066,8 @@ class Code(StrEnum):
 
     The file that a system names as `requirements` speaks of the variables of all levels, `LEVEL.VARIABLE`, and of what comes from
     outside, `PARTY.VARIABLE`. It states properties, requirements and assumptions over time, and may name constants, sets and types for
-    them; variables, tables, modules and levels are declared in the tables of a level.
-
-        state moving : bool
-        requirement one : always not moving
-
-    error: a file of requirements across levels states requirements and properties, and assumptions over time
-
-        requirement one : always not drive.moving
+    them; variables, tables, modules and levels are declared in the tables of a level. Across levels a requirement needs a bound:
+    `within 200 [ms], not drive.moving` or `before CONDITION`, not `eventually`.
     """
     GAP = """RCS401: an input that no line matches
 
