@@ -219,6 +219,23 @@ def test_what_is_assumed_of_a_party_over_time_is_kept_by_every_run(tmp_path: Pat
     assert _answers(_written(tmp_path, never))["never_right"].refuted
 
 
+@pytest.mark.thorough
+def test_an_open_one_says_how_long_no_run_is_that_breaks_it(tmp_path: Path, rcsc: Rcsc) -> None:
+    counter = (
+        _COUNTS.replace("0 .. 3", "0 .. 1000000")
+        .replace("< 3", "< 1000000")
+        .replace("| 3 ", "| 1000000 ")
+        .replace("|| 3 ", "|| 1000000 ")
+    )
+    path = _written(tmp_path, "property never : left.n < 900000\n", files={"left.rcs": counter})
+    status, out, err = rcsc("prove", path, "--no-cache")
+    assert status == 1
+    (line,) = [line for line in out.splitlines() if line.startswith("  never")]
+    looked = int(line.partition("no run of ")[2].split()[0])
+    assert 8 <= looked <= 60
+    assert f"no run of {looked} ticks breaks it" in err
+
+
 def test_what_nothing_ever_asks_for_is_told(tmp_path: Path, rcsc: Rcsc) -> None:
     never = "requirement idle : when boss.go_left and boss.go_right, within 1 cycles, left.runs\n"
     path = _written(tmp_path, never)

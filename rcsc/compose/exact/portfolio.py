@@ -61,6 +61,7 @@ class _Open:
     step: Cycle
     wanted: Sequence[Obligation]
     found: Helped
+    most: int
 
     @property
     def left(self) -> list[int]:
@@ -126,7 +127,7 @@ class _Open:
             while self.left and self.left != before:
                 before = self.left
                 for at in before:
-                    if spent + steps > TOGETHER:
+                    if spent + steps > self.most:
                         return
                     spent += steps
                     answer, conditions = related(
@@ -156,9 +157,10 @@ def helped(
     step: Cycle,
     wanted: Sequence[Obligation],
     invariant: FoundInvariant,
+    most: int = TOGETHER,
 ) -> Helped:
-    """Prove more obligations than an invariant does."""
-    every = _Open(ts, firsts, step, wanted, Helped(invariant))
+    """Prove more obligations than an invariant does; `most` is what Spacer gets for all of them, in steps."""
+    every = _Open(ts, firsts, step, wanted, Helped(invariant), most)
     if every.left:
         every.list_states()
         if not ts.refuses:  # else what is left is tried once more without refusals

@@ -41,6 +41,8 @@ from rcsc.run.description import Description
 
 SHORT, LONG = 8, 60
 """Ticks of the runs that are looked for before a proof is tried, and after it."""
+MOST_STEPS = 10_000_000
+"""What Spacer gets for a requirement, in steps: less than 10 s."""
 NO_RESTART = "no level begins anew while the system runs"
 """What is trusted where levels do not begin anew."""
 
@@ -76,7 +78,7 @@ class Across:
         by: How it was proved, in words.
         around: What may befall the levels there.
         run: A run that breaks it, tick by tick, in the surroundings `broken_in`.
-        looked: No run of so many ticks breaks it there, where none is shown.
+        looked: No run of so many ticks breaks it, where none is shown.
         vacuous: Whether it is proved, too, that nothing ever asks for its response.
         assumed: The assumptions across levels that it may rest on.
         stuck: Whether it is open because what is assumed across levels was not shown to be kept for ever.
@@ -167,7 +169,9 @@ class Question:
         found = Across(self.stated, levels=self.every, assumed=self.assumed, stuck=self._is_stuck())
         left = list[Surroundings]()
         for around in self._surroundings():
-            if run := self._run(around, SHORT):
+            run, known = self._run(around, SHORT)
+            found = replace(found, looked=max(found.looked, known)) if around == Surroundings() else found
+            if run:
                 if len(run) <= len(found.run or run):  # of those as short the one in the kindest surroundings
                     found = replace(found, run=run, broken_in=around)
                 continue
@@ -175,13 +179,15 @@ class Question:
             for timing, names in self._parts():
                 if self._proved(timing, names, around) is not None:
                     return self._as_proved(found, timing, names, around, "")
-        for around in left:
+        for around in dict.fromkeys((*left[:1], *left[-1:])):  # each may take long
             by = self._proved(Timing.SCHEDULED, self._named(), around, exact=True)
             if by is not None:
                 return self._as_proved(found, Timing.SCHEDULED, self._named(), around, by)
-            if not found.run and (run := self._run(around, LONG)):
-                found = replace(found, run=run, broken_in=around)
-        return found if found.run else replace(found, looked=LONG)
+            if not found.run:
+                run, known = self._run(around, LONG)
+                found = replace(found, run=run, broken_in=around if run else None)
+                found = replace(found, looked=max(found.looked, known)) if around == Surroundings() else found
+        return found
 
     def _surroundings(self) -> Iterator[Surroundings]:
         """Yield what may befall the levels, the hardest first."""
@@ -267,14 +273,15 @@ class Question:
 
     # --- runs ---
 
-    def _run(self, around: Surroundings, most: int) -> Ticks:
-        """Look for the shortest run of all levels that breaks it, of so many ticks."""
+    def _run(self, around: Surroundings, most: int) -> tuple[Ticks, int]:
+        """Look for the shortest run of all levels that breaks it, of so many ticks; return it, and how long no run is that does."""
         ts = self._together(self.every, Timing.SCHEDULED, around)
         step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
         made = circuit(ts, firsts, step, obligations(ts, step))
-        for run in looked(made, most).runs.values():
-            return played(ts, made, run, self.stated) or ()
-        return ()
+        found = looked(made, most)
+        for run in found.runs.values():
+            return played(ts, made, run, self.stated) or (), len(run.given) - 1
+        return (), found.cycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,7 +312,7 @@ def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -
     held = tuple(_clauses(ts, chosen, lemmas))
     found, by = _searched((*firsts, step), owed, chosen, held), ""
     if exact:
-        more = helped(ts, firsts, step, wanted, found)
+        more = helped(ts, firsts, step, wanted, found, MOST_STEPS)
         found, by = more.invariant, next(iter(more.by.values()), "")
     if found.open:
         return None

@@ -18,7 +18,7 @@ from rcsc.compose.counterexample.finding import rows
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NO_RESTART, Across, Question
+from rcsc.compose.together.proof import NO_RESTART, Across, Question, Surroundings
 from rcsc.compose.together.repeated import finding_of, repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
@@ -44,6 +44,11 @@ class Answers:
     file: str
     loaded: Loaded
     every: tuple[tuple[Across, Explanation | None], ...]
+
+    @property
+    def told(self) -> bool:
+        """Whether something is told of one besides its line."""
+        return any(explanation is not None or found.vacuous for found, explanation in self.every)
 
 
 def answers(
@@ -97,9 +102,12 @@ def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given:
 def status(
     whole: SystemProof, systems: Mapping[str, TransitionSystem], given: Answers, *, strict: bool
 ) -> int:
-    """Return the exit status: 1 where one is not proved, and where one rests on what is not, if that is asked for."""
+    """Return the exit status: 1 where one is not proved; if strict, where it rests on what is not, trusts more, or is vacuous."""
     every = [found for found, _ in given.every]
-    rests = strict and any(found.vacuous or found.closed(systems, whole.closed).lacks for found in every)
+    rests = strict and any(
+        found.vacuous or found.around != Surroundings() or found.closed(systems, whole.closed).lacks
+        for found in every
+    )
     return 1 if rests or not all(found.proved for found in every) else 0
 
 

@@ -155,7 +155,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     status = max(status, summary(proof).status(strict=asked.strict))
     if given is not None:
         status = max(status, across.status(proof, systems, given, strict=asked.strict))
-    if cache is not None and not status and not explanations and not asked.coverage:
+    quiet = not explanations and not asked.coverage and (given is None or not given.told)
+    if cache is not None and not status and quiet:
         keep_lines(
             cache,
             path,
