@@ -4,7 +4,7 @@ In: a program, its level, the links. Out: `Cycle`s. A cycle takes the inputs, se
 selected table and postprocess, exactly as `interpret.cycle` does; what the environment may do is a condition on what is taken.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
@@ -358,12 +358,27 @@ class TransitionSystem:
         no report can echo yet: the one after the order in the buffer, which may be late, or after the echo if there is none. A report
         echoes what it echoed.
         """
+
+        def any_value(leaf: str) -> Node:
+            return values.variable(f"{leaf} before restart", self.kinds[leaf])
+
+        inputs = {name: any_value(name) for name in sorted(self.inputs)}
+        return self.begun_anew(inputs, any_value, unlike_echo)
+
+    def begun_anew(
+        self, inputs: Leaves, stood: Callable[[str], Node], following: Callable[[Node, Node], Node]
+    ) -> Leaves:
+        """Return the states before the first cycle after a restart.
+
+        Args:
+            inputs: What it finds in its buffers.
+            stood: A leaf as it stood in its own buffers; whether a cycle was refused before, which nobody knows.
+            following: The number of an order, of the one that stood and of the echo.
+        """
         start = self.initial()
         if self.refuses and REFUSED in self.kinds:  # nothing was admitted yet of what it begins with
-            start[REFUSED] = values.variable(f"{REFUSED} before restart", Bool())
-        start |= {
-            name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(self.inputs)
-        }
+            start[REFUSED] = stood(REFUSED)
+        start |= inputs
         for leaf, adopted in self.program.adopted.items():
             match adopted:
                 case Fixed(value):
@@ -371,10 +386,9 @@ class TransitionSystem:
                 case SameAs(other):
                     start[leaf] = start[other]
                 case Stands():
-                    start[leaf] = values.variable(f"{leaf} before restart", self.kinds[leaf])
+                    start[leaf] = stood(leaf)
                 case After(echo):
-                    late = values.variable(f"{leaf} before restart", self.kinds[leaf])
-                    start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
+                    start[leaf] = following(stood(leaf), start[echo])
         return start
 
     def firsts(self) -> dict[str, Cycle]:
@@ -639,6 +653,11 @@ def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tu
             run.state = State(dict(run.state.leaves))
             run.execute((action.statement,))
     return when, run.state
+
+
+def unlike_echo(late: Node, echo: Node) -> Node:
+    """Return a number that no report can echo yet: the one that stood, which may be late, or the one after the echo."""
+    return values.choice(values.equal(late, echo), successor(echo), late)
 
 
 def successor(number: Node) -> Node:

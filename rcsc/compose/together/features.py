@@ -35,17 +35,13 @@ class OfMember(Predicate):
         return Predicate.node(self, own)
 
 
-def features(
-    ts: Together, cycle: Cycle, wanted: Iterable[Node], closely: int = CLOSELY
-) -> tuple[Predicate, ...]:
+def features(ts: Together, cycle: Cycle, wanted: Iterable[Node]) -> tuple[Predicate, ...]:
     """Choose the predicates in the cone of the conditions."""
     reads = [*wanted, cycle.contract]
     inside = cone(cycle, reads)
-    own = every_predicate(ts, cycle, reads, closely)
-    chosen = (*own, *_of_members(ts, inside, closely), *_of_buffers(ts, inside))
-    if closely == CLOSELY:
-        chosen = (*chosen, *side_by_side(ts.program, tuple(_counters(ts, inside)), inside))
-    return unlike(chosen)
+    own = every_predicate(ts, cycle, reads, CLOSELY)
+    counted = side_by_side(ts.program, tuple(_counters(ts, inside)), inside)
+    return unlike((*own, *_of_members(ts, inside), *_of_buffers(ts, inside), *counted))
 
 
 def unlike(every: Iterable[Predicate]) -> tuple[Predicate, ...]:
@@ -56,11 +52,11 @@ def unlike(every: Iterable[Predicate]) -> tuple[Predicate, ...]:
     return tuple(by_name.values())
 
 
-def _of_members(ts: Together, inside: frozenset[str], closely: int) -> Iterator[Predicate]:
+def _of_members(ts: Together, inside: frozenset[str]) -> Iterator[Predicate]:
     for name, member in ts.members.items():
         alone = member.cycle(member.havoc())
         read = [node for leaf, node in alone.before.items() if f"{name}.{leaf}" in inside]
-        yield from (of_member(one, name) for one in every_predicate(member, alone, read, closely))
+        yield from (of_member(one, name) for one in every_predicate(member, alone, read, CLOSELY))
 
 
 def of_member(one: Predicate, name: str) -> OfMember:

@@ -30,6 +30,7 @@ class _Kept:
     refuses: bool
     restarts: bool
     vacuous: bool
+    assumed: tuple[str, ...]
 
 
 def answered(question: Question, cache: Cache | None) -> Across:
@@ -46,7 +47,7 @@ def answered(question: Question, cache: Cache | None) -> Across:
             kept.by,
             around,
             vacuous=kept.vacuous,
-            assumed=question.assumed,
+            assumed=kept.assumed,
         )
     cut_before = smt.cut_short()
     found = question.answer()
@@ -55,7 +56,15 @@ def answered(question: Question, cache: Cache | None) -> Across:
     ):  # else another machine might find something else
         around = found.around
         cache.store(
-            _Kept(found.timing.value, found.levels, found.by, around.refuses, around.restarts, found.vacuous),
+            _Kept(
+                found.timing.value,
+                found.levels,
+                found.by,
+                around.refuses,
+                around.restarts,
+                found.vacuous,
+                found.assumed,
+            ),
             "across",
             key,
         )
@@ -69,14 +78,11 @@ def _key(question: Question) -> str:
         for wire in question.system.wires
         if {wire.source.partition(".")[0], wire.target.partition(".")[0]} & levels.keys()
     )
-    periods = tuple((name, ts.level.period_ms) for name, ts in levels.items())
-    said = replace(question.stated, doc="")
     told = (
         tuple((name, content(ts)) for name, ts in levels.items()),
         wires,
-        periods,
         question.system.tick_ms,
-        (said, said.condition, said.monitor),
-        tuple((one, one.condition, one.monitor) for one in question.program.environment),
+        replace(question.stated, doc=""),
+        question.program.environment,
     )
     return hashlib.sha256(repr(told).encode()).hexdigest()

@@ -27,12 +27,19 @@ from enum import StrEnum
 from math import lcm
 
 from rcsc.compose.contract.environment import Links, leaves_under
-from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem, successor
+from rcsc.compose.contract.transition import (
+    GHOST,
+    REFUSED,
+    Cycle,
+    Leaves,
+    TransitionSystem,
+    successor,
+    unlike_echo,
+)
 from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, kept, monitors
 from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import BEFORE, Bool, Int, Kind, Level, OneTable, Program, Property, Scalar, TableName
 from rcsc.lang.operator_table import Op
-from rcsc.lang.restart import After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.run.description import Description
@@ -53,11 +60,10 @@ class Tick(Cycle):
     """One tick as nodes: a cycle of every level that is due.
 
     Attributes:
-        due: For each level, that it runs; `restarts`, that it begins anew before it; `refuses`, that it is refused an input if it runs.
+        restarts: For each level, that it begins anew before it; `refuses`, that it is refused an input if it runs.
         takes: For each level, what it takes of what no level in it writes.
     """
 
-    due: Mapping[str, Node] = field(default_factory=dict)
     restarts: Mapping[str, Node] = field(default_factory=dict)
     refuses: Mapping[str, Node] = field(default_factory=dict)
     takes: Mapping[str, Leaves] = field(default_factory=dict)
@@ -208,7 +214,6 @@ class Together(TransitionSystem):
         return Tick(
             before, {}, contract, after, tables, after,
             calls=tuple(call for each in cycles.values() for call in each.calls),
-            due=due,
             restarts=restarts,
             takes=takes,
             refuses={name: each.untaken for name, each in cycles.items()},
@@ -220,27 +225,18 @@ class Together(TransitionSystem):
         As scheduled its buffers hold what it gave last, and what it takes; at first they are empty. Else they hold something, as far as the
         contract goes.
         """
-        ts, scheduled = self.members[name], self.timing is Timing.SCHEDULED
+        ts = self.members[name]
 
         def any_value(leaf: str) -> Node:
             return values.variable(f"{name}.{leaf} as it stood{suffix}", ts.kinds[leaf])
 
-        start = {**ts.initial(), **(taken if scheduled else {leaf: any_value(leaf) for leaf in ts.inputs})}
-        for leaf, adopted in ts.program.adopted.items():
-            late = stood[leaf] if scheduled else any_value(leaf)
-            match adopted:
-                case Fixed(value):
-                    start[leaf] = values.constant(ts.kinds[leaf], value)
-                case SameAs(other):
-                    start[leaf] = start[other]
-                case Stands():
-                    start[leaf] = late
-                case After(echo):
-                    late = start[echo] if scheduled and first else late
-                    next_one = successor(late)
-                    echoed = values.equal(late, start[echo])
-                    start[leaf] = next_one if scheduled else values.choice(echoed, next_one, late)
-        return start
+        if self.timing is Timing.ANY:
+            return ts.begun_anew({leaf: any_value(leaf) for leaf in ts.inputs}, any_value, unlike_echo)
+        return ts.begun_anew(
+            taken,
+            lambda leaf: any_value(leaf) if leaf == REFUSED else stood[leaf],
+            lambda late, echo: successor(echo if first else late),
+        )
 
     def _due(self, name: str, before: Leaves, suffix: str) -> Node:
         if self.timing is Timing.ANY:

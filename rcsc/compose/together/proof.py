@@ -143,12 +143,6 @@ class Question:
         """The levels that it names, and all that write to these, directly or not."""
         return tuple(self._reached_from(self._named(), len(self.systems)))
 
-    @property
-    def assumed(self) -> tuple[str, ...]:
-        """The assumptions across levels that speak of these levels and of who stands outside them."""
-        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
-        return tuple(one.name for one in ts.program.environment)
-
     def answer(self) -> Across:
         """Prove it or refute it; where it is proved, tell whether anything ever asks for its response."""
         found = self.verdict()
@@ -166,7 +160,10 @@ class Question:
 
     def verdict(self) -> Across:
         """Prove it or refute it."""
-        found = Across(self.stated, levels=self.every, assumed=self.assumed, stuck=self._is_stuck())
+        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
+        assumed = tuple(one.name for one in ts.program.environment)
+        stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
+        found = Across(self.stated, levels=self.every, assumed=assumed, stuck=stuck)
         left = list[Surroundings]()
         for around in self._surroundings():
             run, known = self._run(around, SHORT)
@@ -264,12 +261,6 @@ class Question:
         }
         ts = together(systems, names, self.system, self.program, timing, self.stated.name)
         return replace(ts, restarting=around.restarts)
-
-    def _is_stuck(self) -> bool:
-        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
-        return bool(ts.program.environment) and not goes_on(
-            ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc())
-        )
 
     # --- runs ---
 

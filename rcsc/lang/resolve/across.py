@@ -101,7 +101,7 @@ def resolve_across(
     scope.units |= _units(parties)
     for declaration in own:
         if not isinstance(declaration, STATES):
-            _refused(scope, declaration)
+            _refused(scope, declaration, root)
     if scope.diagnostics:
         return _sorted(scope)
     words = [d for d in used if isinstance(d, NAMES)]
@@ -144,10 +144,10 @@ def _sorted(scope: Scope) -> tuple[Diagnostic, ...]:
     return tuple(sorted(set(scope.diagnostics), key=sort_key))
 
 
-def _refused(scope: Scope, declaration: tree.Declaration) -> None:
+def _refused(scope: Scope, declaration: tree.Declaration, root: str) -> None:
     """Report a declaration that has no place in such a file."""
     name = getattr(declaration, "name", None)
-    span = name.span if isinstance(name, tree.Name) else Span(scope.places.get("", Span("", 0, 0)).file, 0, 0)
+    span = name.span if isinstance(name, tree.Name) else Span(root, 0, 0)
     message = (
         "a file of requirements across levels states requirements and properties, and assumptions over time"
     )
