@@ -213,17 +213,18 @@ class Description:
         where = "parameters" if parameters else spec.key
         return Instance(file, spec.name, parameters, page.span(("level", at, where)))
 
-    def load(self, path: Path, spec: LevelSpec) -> Loaded | None:
+    def load(self, path: Path, spec: LevelSpec, overlay: Mapping[str, str] | None = None) -> Loaded | None:
         """Read the files of a level's program; None where there is no root file.
 
         Args:
             path: Of this description, beside which they stand.
             spec: The level.
+            overlay: Texts that stand for what is on disk, by real path.
         """
         file = next((place for place in places(path, spec.source) if place.is_file()), None)
         if file is None:
             return None
-        loaded = again(str(file), self.instance(spec, str(file)))
+        loaded = again(str(file), self.instance(spec, str(file)), overlay)
         page = self.review()
         return (
             replace(loaded, sources={**loaded.sources, page.name: page.source}) if spec.parameters else loaded

@@ -4,14 +4,63 @@ In: a system's description and the programs of its levels. Out: `Parties` for `r
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
+from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, content, toml_of
 from rcsc.compose.proof.system import NoProgramError, loaded_program
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded, load, systems_above
 from rcsc.lang.resolve.across import Named, Parties, named, part_of, resolve_across
-from rcsc.run.description import BadDescription, Description, description
+from rcsc.run.description import BadDescription, Description, LevelSpec, description
+
+Read: TypeAlias = Callable[[Path, Description, LevelSpec], tuple[Program, Loaded]]
+
+
+@dataclass(frozen=True, slots=True)
+class LevelsRead:
+    """A system as its description and its levels' texts say it.
+
+    Attributes:
+        loaded: The files of each level, by its name.
+    """
+
+    system: Description
+    programs: Mapping[str, Program]
+    loaded: Mapping[str, Loaded]
+
+    def means(self, root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
+        """Return what a file of requirements means of them, or every diagnostic of it."""
+        return resolve_across(root, loaded, parties(self.system, self.programs), self.system.tick_ms)
+
+
+def levels_read(path: Path, read: Read = loaded_program) -> LevelsRead:
+    """Read a description and its levels.
+
+    Raises:
+        BadDescription: The description is not in order.
+        NoProgramError: A level is not in order, or missing.
+    """
+    system = description(path)
+    levels = {spec.name: read(path, system, spec) for spec in system.levels}
+    programs = {name: program for name, (program, _) in levels.items()}
+    return LevelsRead(system, programs, {name: loaded for name, (_, loaded) in levels.items()})
+
+
+def system_naming(file: str) -> Path | None:
+    """Return the description beside a file or above it that names it as its requirements across levels."""
+    real = os.path.realpath(file)
+    for path in systems_above(file):
+        try:
+            said = toml_of(content(path, MOST_TOML_BYTES)).get("requirements")
+        except (OSError, ValueError, Malformed):
+            continue
+        if isinstance(said, str) and os.path.realpath(path.parent / said) == real:
+            return path
+    return None
 
 
 def stated_across(system: Description, programs: Mapping[str, Program]) -> tuple[Program, Loaded] | None:
@@ -23,11 +72,7 @@ def stated_across(system: Description, programs: Mapping[str, Program]) -> tuple
     if system.requirements is None:
         return None
     loaded = load([os.path.relpath(system.requirements)])
-    program = (
-        resolve_across(loaded.roots[0], loaded, parties(system, programs), system.tick_ms)
-        if loaded.roots
-        else ()
-    )
+    program = LevelsRead(system, programs, {}).means(loaded.roots[0], loaded) if loaded.roots else ()
     if isinstance(program, Program):
         return program, loaded
     raise NoProgramError(
@@ -40,18 +85,14 @@ def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> t
 
     Nothing is told of it where the levels of that system are not in order, which is told of their own files.
     """
-    real = os.path.realpath(root)
-    for path in systems_above(root):
-        try:
-            system = description(path)
-            if system.requirements is None or os.path.realpath(system.requirements) != real:
-                continue
-            programs = {spec.name: loaded_program(path, system, spec)[0] for spec in system.levels}
-        except (BadDescription, NoProgramError):
-            continue
-        found = resolve_across(root, loaded, parties(system, programs), system.tick_ms)
-        return () if isinstance(found, Program) else found
-    return tuple(otherwise)
+    path = system_naming(root)
+    if path is None:
+        return tuple(otherwise)
+    try:
+        found = levels_read(path).means(root, loaded)
+    except (BadDescription, NoProgramError):
+        return ()
+    return () if isinstance(found, Program) else found
 
 
 def parties(system: Description, programs: Mapping[str, Program]) -> Parties:

@@ -16,8 +16,9 @@ not found any name.
 import os
 import re
 from bisect import bisect_right
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.base.diagnostics.source import Source, Span
@@ -32,8 +33,8 @@ from rcsc.lang.written.tables import RowText, cells_of, tables_of
 MOST_ROUNDS = 12
 """Times that something is left out; a text with more layers of errors is not looked at further."""
 _BEGINS = re.compile(
-    r"^[ \t]*(?P<word>use|unit|const|set|enum|type|record|input|state|output|assume|invariant|property|procedure|module|extern"
-    r"|owner|table|link|serves|commands|adopt|level)\b(?:[ \t]+(?P<name>\w+))?",
+    r"^[ \t]*(?P<word>use|unit|const|set|enum|type|record|input|state|output|assume|invariant|property|requirement|procedure|module"
+    r"|extern|owner|table|link|serves|commands|adopt|level)\b(?:[ \t]+(?P<name>\w+))?",
     re.MULTILINE | re.ASCII,
 )
 _AFTER = re.compile(r"(?:\s*^[ \t]*#[^\r\n]*)*\s*\Z", re.MULTILINE)
@@ -42,6 +43,10 @@ _WORD = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _COMMENT = re.compile(r"#[^\r\n]*")
 _BLANKS = re.compile(r"[ \t]*")
 _NOT_END = re.compile(r"[^\r\n]")
+
+
+Meaning: TypeAlias = Callable[[str, Loaded], Program | tuple[Diagnostic, ...]]
+"""What a root file means: a program, or why it means none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +171,13 @@ def _named(text: str, found: re.Match[str]) -> tuple[str, tuple[int, int]] | Non
     return found["name"], found.span("name")
 
 
-def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Mapping[str, str]) -> Rest:
+def rest_of(
+    root: str,
+    loaded: Loaded,
+    wrong: Sequence[Diagnostic],
+    overlay: Mapping[str, str],
+    means: Meaning = resolve,
+) -> Rest:
     """Return the rest of a file's program, with the broken parts left out.
 
     Args:
@@ -174,6 +185,7 @@ def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Map
         loaded: As it was read.
         wrong: Why it is not in order.
         overlay: Texts that stand for what is on disk, by real path.
+        means: What the file means.
     """
     pieces: dict[str, _Pieces] = {}
     out: dict[Span, None] = {}
@@ -190,7 +202,7 @@ def rest_of(root: str, loaded: Loaded, wrong: Sequence[Diagnostic], overlay: Map
             break
         out.update(dict.fromkeys(new))
         current = load([root], overlay={**overlay, **_blanked(pieces, out)})
-        program = _resolved(root, current)
+        program = _resolved(root, current, means)
         if isinstance(program, Program):
             return Rest(program, current, tuple(out), _harmed(pieces, out), tuple(found))
         told = program
@@ -204,10 +216,10 @@ def _harmed(pieces: Mapping[str, _Pieces], out: Iterable[Span]) -> tuple[Span, .
     )
 
 
-def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
+def _resolved(root: str, loaded: Loaded, means: Meaning) -> Program | tuple[Diagnostic, ...]:
     """Return the program, or its errors."""
     if root in loaded.files:
-        return resolve(root, loaded)
+        return means(root, loaded)
     files = set(closure(root, loaded))
     return tuple(each for each in loaded.diagnostics if each.primary.span.file in files)
 

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.base.diagnostics.codes import Code
@@ -19,10 +20,13 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity, Witnes
 from rcsc.base.diagnostics.report import TableReport, resting
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.base.host.memory import uncollected
+from rcsc.compose.proof.system import NoProgramError
+from rcsc.compose.together.words import LevelsRead, levels_read, parties, system_naming
 from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.memo import Memo, OutdatedError
+from rcsc.desk.editor.names.find import Names, Party
 from rcsc.desk.editor.places import Area, Lines, difference
-from rcsc.desk.editor.recovery import Rest, rest_of
+from rcsc.desk.editor.recovery import Meaning, Rest, rest_of
 from rcsc.desk.editor.values import (
     BEING_PROVED,
     GIVEN_UP,
@@ -45,6 +49,7 @@ from rcsc.proof.solvers.options import WRONG_STEPS, Options
 from rcsc.proof.symbolic.remembered import remembering
 from rcsc.proof.table.mending import COUNTED, key, mended, serious
 from rcsc.proof.table.program import prove_program
+from rcsc.run.description import BadDescription, Description, LevelSpec
 
 if TYPE_CHECKING:
     from rcsc.lang.syntax import tree
@@ -72,6 +77,7 @@ class Reading:
         program: None where the text is not in order.
         rest: What is looked at instead.
         wrong: Why it is not in order.
+        levels: Of a file of requirements across levels, what they are about.
     """
 
     path: str
@@ -79,6 +85,7 @@ class Reading:
     program: Program | None
     rest: Rest | None
     wrong: tuple[Diagnostic, ...]
+    levels: LevelsRead | None = None
 
     @property
     def nearest(self) -> Program | None:
@@ -87,15 +94,26 @@ class Reading:
 
     @property
     def files(self) -> "Mapping[str, tree.File]":
-        """Every file that parses, and the rest of each that does not."""
-        return self.loaded.files if self.rest is None else {**self.loaded.files, **self.rest.loaded.files}
+        """Every file that parses, and the rest of each that does not; those of the levels that requirements are about, too."""
+        own = self.loaded.files if self.rest is None else {**self.loaded.files, **self.rest.loaded.files}
+        return {**{name: file for each in self._levels for name, file in each.files.items()}, **own}
 
     @property
     def sources(self) -> Mapping[str, Source]:
         """Every text as it is."""
-        return (
-            self.loaded.sources if self.rest is None else {**self.rest.loaded.sources, **self.loaded.sources}
-        )
+        rest = {} if self.rest is None else self.rest.loaded.sources
+        levels = {name: source for each in self._levels for name, source in each.sources.items()}
+        return {**levels, **rest, **self.loaded.sources}
+
+    @property
+    def names(self) -> Names:
+        """The names of all that is read."""
+        across = {} if self.levels is None else {self.path: _parties(self.levels)}
+        return Names(self.files, self.sources, self.nearest, across)
+
+    @property
+    def _levels(self) -> tuple[Loaded, ...]:
+        return () if self.levels is None else tuple(self.levels.loaded.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +146,7 @@ class Workspace:
         self.memo = Memo()
         self._overlay: Mapping[str, str] = {}
         self._readings: dict[str, Reading] = {}
+        self._levels: dict[Path, LevelsRead] = {}
         self._reads = threading.Lock()
         self._checked: dict[str, Checked] = {}
         self._answers: dict[str, tuple[Checked, Answer]] = {}
@@ -285,10 +304,44 @@ class Workspace:
             overlay = self._overlay
             loaded = load([path], overlay=overlay)
             before = self._readings.get(path)
-            if before is not None and _alike(before.loaded, loaded):
+            system = system_naming(path)
+            levels = None if system is None else self._levels_of(system, overlay)
+            if before is not None and _alike(before.loaded, loaded) and before.levels is levels:
                 return before
-            self._readings[path] = reading = _read(path, loaded, overlay)
+            if system is not None and levels is None:  # which is told of the level that is not in order
+                reading = Reading(path, loaded, None, None, loaded.diagnostics)
+            else:
+                means = resolve if levels is None else levels.means
+                reading = replace(_read(path, loaded, overlay, means), levels=levels)
+            self._readings[path] = reading
             return reading
+
+    def _levels_of(self, system: Path, overlay: Mapping[str, str]) -> LevelsRead | None:
+        """Read the levels of a system as the texts are; a level that is not in order as it last was, None where it never was."""
+        before = self._levels.get(system)
+
+        def read(path: Path, described: Description, spec: LevelSpec) -> tuple[Program, Loaded]:
+            now = described.load(path, spec, overlay)
+            known = None if before is None or spec.name not in before.programs else before
+            if now is None:
+                raise NoProgramError(spec.name)
+            if known is not None and _alike(known.loaded[spec.name], now):
+                return known.programs[spec.name], known.loaded[spec.name]
+            program = resolve(now.roots[0], now)
+            if isinstance(program, Program):
+                return program, now
+            if known is None:
+                raise NoProgramError(spec.name)
+            return known.programs[spec.name], known.loaded[spec.name]
+
+        try:
+            now = levels_read(system, read)
+        except (BadDescription, NoProgramError):
+            return before
+        if before is not None and now.system == before.system and _all_alike(before.loaded, now.loaded):
+            return before
+        self._levels[system] = now
+        return now
 
     def checked(self, path: str) -> Checked:
         """Check a file, from memory if no text that it depends on has changed."""
@@ -301,14 +354,15 @@ class Workspace:
         return before
 
     def _check(self, reading: Reading, options: Options) -> Checked:
-        if reading.program is not None:
+        if reading.program is not None and reading.levels is None:
             found, reports = self._proved(reading, reading.program, options)
             every = tuple(sorted({*reading.wrong, *found}, key=sort_key))
             return Checked(reading, every, (), reports)
-        assert reading.rest is not None
+        if reading.rest is None:
+            return Checked(reading, reading.wrong, (), {})
         found = (
             ()
-            if reading.rest.program is None
+            if reading.rest.program is None or reading.levels is not None
             else self._proved(reading, reading.rest.program, options, reading.rest.harmed)[0]
         )
         more = {*reading.rest.wrong, *serious(found)} - set(reading.wrong)
@@ -409,12 +463,12 @@ def _inside(span: Span, wholes: Iterable[Span]) -> bool:
     return any(whole.file == span.file and whole.start <= span.start < whole.end for whole in wholes)
 
 
-def _read(path: str, loaded: Loaded, overlay: Mapping[str, str]) -> Reading:
-    resolved = resolve(path, loaded) if path in loaded.files else ()
+def _read(path: str, loaded: Loaded, overlay: Mapping[str, str], means: Meaning) -> Reading:
+    resolved = means(path, loaded) if path in loaded.files else ()
     if isinstance(resolved, Program):
         return Reading(path, loaded, resolved, None, loaded.diagnostics)
     wrong = tuple(sorted({*loaded.diagnostics, *resolved}, key=sort_key))
-    return Reading(path, loaded, None, rest_of(path, loaded, wrong, overlay), wrong)
+    return Reading(path, loaded, None, rest_of(path, loaded, wrong, overlay, means), wrong)
 
 
 def _spent(since_s: float) -> Callable[[], bool]:
@@ -431,6 +485,19 @@ def _alike(before: Loaded, now: Loaded) -> bool:
         now.diagnostics,
         now.uses,
     )
+
+
+def _parties(levels: LevelsRead) -> dict[str, Party]:
+    """Return the parties of a system, by name."""
+    found = {name: Party() for name in parties(levels.system, levels.programs)}
+    for name, program in levels.programs.items():
+        files = frozenset(map(os.path.realpath, levels.loaded[name].files))
+        found[name] = Party(files, program)
+    return found
+
+
+def _all_alike(before: Mapping[str, Loaded], now: Mapping[str, Loaded]) -> bool:
+    return before.keys() == now.keys() and all(_alike(before[name], now[name]) for name in now)
 
 
 def _names_in(loaded: Loaded, diagnostic: Diagnostic) -> set[str]:

@@ -4,10 +4,11 @@ In: an occurrence, the program, and the standing of tables. Out: a text.
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from rcsc.base.diagnostics.source import Source
 from rcsc.desk.editor.grid import type_text
-from rcsc.desk.editor.names.find import Names
+from rcsc.desk.editor.names.find import Names, Party
 from rcsc.desk.editor.names.index import Occurrence, Space
 from rcsc.desk.editor.values import Grid, Standing
 from rcsc.lang.leaves import Uses, read_by, spoken_of
@@ -43,7 +44,12 @@ def about(names: Names, name: Occurrence, grids: Mapping[str, Grid]) -> str:
         grids: The tables of the file that is open, by name.
     """
     found = names.declarations(name)
-    lines = [*_declared(names, name, found), *_known(names.program, name, grids)]
+    known = (
+        _across(names, name)
+        if names.party(name) != Party() or name.party
+        else _known(names.program, name, grids)
+    )
+    lines = [*_declared(names, name, found), *known]
     return "\n\n".join(lines)
 
 
@@ -79,6 +85,25 @@ def _head(name: Occurrence, source: Source) -> str:
         case _:
             line = source.line(source.position(name.span.start).line).strip()
             return line.removesuffix("{").strip()
+
+
+def _across(names: Names, name: Occurrence) -> Iterator[str]:
+    """Yield what is known of a party, or of its variable, in requirements across levels."""
+    level = names.party(name).program
+    if not name.party:
+        yield f"level `{name.text}` of the system"
+        return
+    yield f"of level `{name.party}`" if level is not None else f"of `{name.party}`, outside the levels"
+    if level is not None:
+        yield from _known(level, replace(name, party=""), {})
+        return
+    record = next(
+        (each.type for each in (names.program.declared if names.program else ()) if each.name == name.party),
+        None,
+    )
+    for part in record.fields if isinstance(record, Record) else ():
+        if part.name == name.text:
+            yield _range(part.type)
 
 
 def _known(program: Program | None, name: Occurrence, grids: Mapping[str, Grid]) -> Iterator[str]:

@@ -275,8 +275,10 @@ class _Complete:
                 yield Offer(each.text, "constant")
 
     def members(self) -> Iterator[Offer]:
-        """Yield the members of all enumerations."""
-        for enum in self.program.enums if self.program else ():
+        """Yield the members of all enumerations, those of other levels' variables too."""
+        program = self.program
+        leaves = (each.type for each in program.variables if isinstance(each.type, Enum)) if program else ()
+        for enum in dict.fromkeys((*program.enums, *leaves)) if program else ():
             yield from (Offer(member, "member", enum.name) for member in enum.members)
 
     def declared(self, space: Space) -> list[str]:

@@ -3,8 +3,8 @@
 In: a parsed file. Out: occurrences, in the order of the tree.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import pairwise
 
@@ -25,6 +25,7 @@ class Space(StrEnum):
     UNIT = "unit"
     LINK = "link"
     PEER = "peer"
+    PARTY = "party"  # a level, or who stands outside, in requirements across levels
     FIELD = "field"
     LOCAL = "local"
     LINE = "line"
@@ -39,6 +40,7 @@ class Occurrence:
         owner: The procedure of a local, the table of a line; else empty.
         declares: Whether it is declared here; `node` is then its declaration.
         further: Where it goes on in rows below, where a heading is broken in it.
+        party: Of `LEVEL.VARIABLE`, in requirements across levels: whose variable it is.
     """
 
     space: Space
@@ -48,12 +50,18 @@ class Occurrence:
     declares: bool = False
     node: object = field(default=None, compare=False, repr=False)
     further: tuple[Span, ...] = field(default=(), repr=False)
+    party: str = ""
 
 
-def occurrences(file: tree.File) -> Iterator[Occurrence]:
-    """Yield every name of a file."""
+def occurrences(file: tree.File, parties: Collection[str] = ()) -> Iterator[Occurrence]:
+    """Yield every name of a file.
+
+    Args:
+        file: As parsed.
+        parties: What it calls the parties of a system, where it states requirements across levels.
+    """
     for declaration in file.declarations:
-        yield from _Walk().declaration(declaration)
+        yield from _Walk(parties).declaration(declaration)
 
 
 @dataclass(slots=True)
@@ -65,6 +73,7 @@ class _Walk:
         owner: The procedure that is being walked, and its locals.
     """
 
+    parties: Collection[str] = ()
     cell: Cell | None = None
     shift: int = 0
     owner: str = ""
@@ -344,6 +353,11 @@ class _Walk:
     def expr(self, expr: tree.Expr) -> Iterator[Occurrence]:
         """Yield the names of an expression."""
         match expr:
+            case tree.Reference(name) if name.text in self.parties:
+                yield self.name(Space.PARTY, name)
+            case tree.FieldOf(tree.Reference(party), name) if party.text in self.parties:
+                yield self.name(Space.PARTY, party)
+                yield replace(self.name(Space.VALUE, name), party=party.text)
             case tree.Reference(name):
                 own = name.text in self.locals
                 yield self.name(Space.LOCAL if own else Space.VALUE, name, None, self.owner if own else "")

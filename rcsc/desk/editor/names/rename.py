@@ -45,6 +45,10 @@ def renamable(names: Names, name: Occurrence) -> Occurrence:
     """
     if name.space is Space.FILE:
         raise RefusedError("a file is renamed on disk, and its `use`s by hand")
+    if name.space is Space.PARTY:
+        raise RefusedError(
+            f"`{name.text}` is what the system's description calls a level, or who stands outside"
+        )
     found = [each for each in names.uses(name) if each.declares]
     if not found:
         raise RefusedError(

@@ -35,8 +35,8 @@ TYPES = (
 MODIFIERS = ("declaration", "readonly")
 _OF_SPACE = {
     Space.VALUE: "variable", Space.MEMBER: "enumMember", Space.TYPE: "type", Space.CALL: "function", Space.TABLE: "class",
-    Space.CLAIM: "decorator", Space.UNIT: "type", Space.LINK: "interface", Space.PEER: "namespace", Space.FIELD: "property",
-    Space.LOCAL: "parameter", Space.LINE: "label", Space.FILE: "namespace",
+    Space.CLAIM: "decorator", Space.UNIT: "type", Space.LINK: "interface", Space.PEER: "namespace", Space.PARTY: "namespace",
+    Space.FIELD: "property", Space.LOCAL: "parameter", Space.LINE: "label", Space.FILE: "namespace",
 }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ In: requests. Out: the protocol's answers; no proof is waited for but by hover, 
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from rcsc.desk.editor import keys
 from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.names.about import about
 from rcsc.desk.editor.names.complete import Offer, offers
-from rcsc.desk.editor.names.find import Names
+from rcsc.desk.editor.names.find import Names, Party
 from rcsc.desk.editor.names.index import Occurrence, Space
 from rcsc.desk.editor.names.rename import RefusedError, renamable, renamed
 from rcsc.desk.editor.names.tokens import MODIFIERS, TYPES, tokens
@@ -29,6 +29,7 @@ from rcsc.desk.editor.server.convert import Converter
 from rcsc.desk.editor.server.session import Session, current
 from rcsc.desk.editor.values import BEING_PROVED, Grid
 from rcsc.lang.model import Program
+from rcsc.lang.project import Loaded
 from rcsc.lang.resolve import resolve
 from rcsc.lang.resolve.program import closure
 from rcsc.lang.syntax.rows import stub_of
@@ -171,12 +172,25 @@ def _project(session: Session, path: str, name: Occurrence) -> Names:
     if declared:
         programs = [set(closure(root, loaded)) for root in loaded.given]
         related = {path}.union(*(program for program in programs if program & declared))
+    stating = _stating(session, loaded, related)
+    related |= stating.keys()
     files = {file: each for file, each in loaded.files.items() if file in related}
     for file in related & loaded.sources.keys() - files.keys():  # half written: what is left of them
         files |= {
             other: each for other, each in session.workspace.reading(file).files.items() if other == file
         }
-    return Names(files, loaded.sources, session.workspace.reading(path).nearest)
+    return Names(files, loaded.sources, session.workspace.reading(path).nearest, stating)
+
+
+def _stating(session: Session, loaded: Loaded, files: Collection[str]) -> dict[str, Mapping[str, Party]]:
+    """Return the files that state requirements across levels of which one is made of these files, with their parties."""
+    real = set(map(os.path.realpath, files))
+    return {
+        file: parties
+        for root in loaded.given
+        for file, parties in session.workspace.reading(root).names.across.items()
+        if os.path.realpath(file) in real or any(real & party.files for party in parties.values())
+    }
 
 
 def _references(session: Session, params: types.ReferenceParams) -> list[types.Location]:
@@ -253,6 +267,17 @@ def _wrong_with(session: Session, path: str, names: Names, name: Occurrence, tex
                     if resolved
                     else f"{root} does not parse"
                 )
+    return _wrong_across(session, names, texts)
+
+
+def _wrong_across(session: Session, names: Names, texts: Mapping[str, str]) -> str:
+    """Return the first error that these texts bring into requirements across levels that are in order without them."""
+    trial = session.workspace.trial(texts)
+    for file in names.across:
+        before, after = session.workspace.reading(file), trial.reading(file)
+        if before.program is not None and after.program is None:
+            why = after.wrong[0].message if after.wrong else "a level is not in order"
+            return f"{why} ({os.path.basename(file)})"
     return ""
 
 

@@ -222,8 +222,7 @@ class Session:
 
     def names(self, path: str) -> Names:
         """Return the names of a file and of all that it uses."""
-        reading = self.workspace.reading(path)
-        return Names(reading.files, reading.sources, reading.nearest)
+        return self.workspace.reading(path).names
 
     def stop(self) -> None:
         """Stop the proof under way, as soon as possible."""

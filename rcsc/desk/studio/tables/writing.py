@@ -46,8 +46,7 @@ class Writing(Concern):
             self._workspace.close(gone)
         for file, text in texts.items():
             self._workspace.open(file, text)
-        reading = self._workspace.reading(path)
-        return Names(reading.files, reading.sources, reading.nearest), path
+        return self._workspace.reading(path).names, path
 
     def _at(self, ask: Ask) -> tuple[Names, str, int]:
         """Return the same, and the offset of the place in the question."""
