@@ -460,11 +460,11 @@ def test_the_matrix_shows_it_once_it_is_known(tmp_path: Path, capsys: pytest.Cap
     asked = ["trace", str(system.with_name("solo.rcs")), "--no-vectors", "--find", "t again"]
     assert run(["prove", str(system)]) == 0
     assert run(asked) == 0
-    assert "no requirement speaks" not in capsys.readouterr().out
+    assert "no requirement of the level speaks" not in capsys.readouterr().out
     assert run(["prove", str(system), "--coverage"]) == 0
     assert run(asked) == 0
     printed = capsys.readouterr().out
-    assert "no requirement speaks of what it writes to tries, fast" in printed
+    assert "no requirement of the level speaks of what it writes to tries, fast" in printed
     assert "without all that it does, everything that is proved of the level still holds" in printed
     assert run([*asked[:-1], "slow"]) == 0
     assert "needs 6 assignments, no fewer" in capsys.readouterr().out

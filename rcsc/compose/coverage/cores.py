@@ -48,7 +48,7 @@ class Core:
 def core(asked: Questions, key: Key) -> Core | None:
     """Return the core of a requirement that is proved; None where Z3 does not show it once more from the invariant."""
     with smt.together(FINDING):
-        found = asked.needed(key, asked.members, asked.clauses)
+        found = asked.needed([key], asked.members, asked.clauses)
     if found is None:
         return None
     with smt.together(STEPS):
@@ -75,7 +75,7 @@ def _fewer(asked: Questions, key: Key, found: Needed) -> Needed:
         left = found.members - {member}
         clauses = asked.kept(left, sorted(found.clauses))
         if clauses is not None and asked.follow([key], left, clauses):
-            found = asked.needed(key, left, clauses) or found
+            found = asked.needed([key], left, clauses) or found
     return found
 
 

@@ -47,6 +47,7 @@ class Coverage:
         unneeded: Uses that none of these needs; `assumptions`, those that are trusted, or other levels owe, and none needs.
         slips: All slips with their verdicts; none where nothing is stated.
         offers: Properties that would notice some that survive.
+        across: What each requirement across levels needs of this one, by name, or None; None of all where nobody looked.
     """
 
     level: str
@@ -58,6 +59,19 @@ class Coverage:
     assumptions: tuple[str, ...] = ()
     slips: tuple[Judged, ...] = ()
     offers: tuple[Offered, ...] = ()
+    across: tuple[tuple[str, tuple[Use, ...] | None], ...] | None = None
+
+    @property
+    def silent(self) -> tuple[Use, ...]:
+        """The uses that no requirement speaks of, neither of the level nor, as far as that is known, across levels."""
+        needed = {use for _, uses in self.across or () for use in uses or ()}
+        return tuple(use for use in self.unneeded if use not in needed)
+
+    @property
+    def complete(self) -> bool:
+        """Whether of each requirement it is known what it needs."""
+        every = all(uses is not None for _, uses in self.across or ())
+        return len(self.cores) == self.requirements and self.across is not None and every
 
     @property
     def surviving(self) -> tuple[Judged, ...]:
@@ -79,7 +93,7 @@ def covered(ts: TransitionSystem, proof: LevelProof, loaded: Loaded | None = Non
     """Look at what the requirements of a level speak of; without its files nothing is offered."""
     wanted = stated(ts, proof)
     if not wanted:
-        return Coverage(ts.level.name, 0)
+        return Coverage(ts.level.name, 0, unneeded=uses_of(ts.program, ts.level))
     proved = {owed.key for owed, verdict in proof.verdicts if verdict in ACCEPTED}
     unproved = tuple(key for key in wanted if key not in proved)
     places = environments(ts, proof)

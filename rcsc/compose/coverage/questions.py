@@ -7,12 +7,12 @@ Source: Ghassabani, Gacek and Whalen, *Efficient generation of inductive validit
 that is needed is needed, too, up to a fixed point.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.compose.contract.claims import Key
-from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.coverage.parts import How, Switched, Use, switched
 from rcsc.compose.invariant.cubes import held
@@ -29,8 +29,8 @@ from rcsc.proof.symbolic.values import Node
 LIMITS = Limits.of(4_000_000)
 """Of one question: those that an invariant answers take far less."""
 
-Member: TypeAlias = Use | str
-"""What a proof may need: a use, or the name of an assumption that is trusted, or that another level owes."""
+Member: TypeAlias = Use | str | tuple[str, Use]
+"""What a proof may need: a use (of several levels with its level), or an assumption that is trusted, or owed by another level, by name."""
 Goal: TypeAlias = Key | int
 """An obligation, or a clause by position."""
 
@@ -48,14 +48,14 @@ class Needed:
 
 
 @dataclass(slots=True)
-class _Frame:
+class Frame:
     """A cycle with its solver.
 
     Attributes:
         held: A literal for each clause before it; none of a first cycle.
         broken: For each clause one that it does not hold after it; `bad`, for each obligation one that it is broken.
         on: The literal of each member.
-        differs: One that the cycle leaves anything else than if all uses were on.
+        differs: One that the cycle leaves anything else than if all uses were on; of no use where that is not asked.
     """
 
     solver: Solver
@@ -64,6 +64,44 @@ class _Frame:
     bad: dict[Key, Term]
     on: dict[Member, Term]
     differs: Term
+
+    @classmethod
+    def of(
+        cls,
+        contract: Node,
+        clauses: tuple[Sequence[Node], Sequence[Node]],
+        owed: Iterable[Obligation],
+        on: Mapping[Member, Node],
+        *,
+        exact: bool,
+        differs: Node = values.FALSE,
+    ) -> "Frame":
+        """Make the terms of a cycle.
+
+        Args:
+            contract: What the environment keeps to in it.
+            clauses: That each clause holds before it, none of a first cycle, and after it.
+            owed: What it owes.
+            on: That each member is on.
+            exact: Whether all arithmetic of integers is.
+            differs: That it leaves anything else than with all on.
+        """
+        keyed = ExactIntegers() if exact else Keyed()
+        before, after = clauses
+        broken = map(values.negation, after)
+        bad = {each.key: values.negation(each.holds) for each in owed}
+        allowed, *terms = map(keyed.term, [contract, *before, *broken, *bad.values(), *on.values(), differs])
+        solver = Solver(LIMITS)
+        solver.add(*keyed.ranges, allowed)
+        literals = iter(map(solver.switch, terms))
+        return cls(
+            solver,
+            [next(literals) for _ in before],
+            [next(literals) for _ in after],
+            {key: next(literals) for key in bad},
+            {member: next(literals) for member in on},
+            next(literals),
+        )
 
     def refuted(self, assuming: Sequence[Term], bad: Term) -> tuple[Term, ...] | None:
         """Return those of the literals that exclude what is bad; None where they do not, or Z3 gives up."""
@@ -101,7 +139,7 @@ class Questions:
     how: How
     made: Switched = field(init=False)
     members: tuple[Member, ...] = field(init=False)
-    _frames: list[_Frame] = field(init=False)
+    _frames: list[Frame] = field(init=False)
 
     def __post_init__(self) -> None:
         """Make the cycles, as terms."""
@@ -126,13 +164,9 @@ class Questions:
         """All clauses of the invariant."""
         return range(len(self.proof.clauses))
 
-    def _frame(self, loose: TransitionSystem, suffix: str, cycle: Cycle) -> _Frame:
-        keyed = ExactIntegers() if self.proof.exact else Keyed()
-        later = suffix == " taken"
+    def _frame(self, loose: TransitionSystem, suffix: str, cycle: Cycle) -> Frame:
         predicates, clauses = self.proof.predicates, self.proof.clauses
-        before = held(predicates, clauses, cycle.before) if later else []
-        after = map(values.negation, held(predicates, clauses, cycle.after))
-        bad = {owed.key: values.negation(owed.holds) for owed in obligations(loose, cycle)}
+        before = held(predicates, clauses, cycle.before) if suffix == " taken" else []
         on: dict[Member, Node] = {use: cycle.taken[name] for use, name in self.made.switches.items()}
         on |= _assumptions(self.ts, cycle)
         as_written = dict.fromkeys(self.made.switches.values(), values.TRUE)
@@ -142,53 +176,17 @@ class Questions:
             for name in self.ts.kinds
             if name not in self.ts.inputs
         )
-        nodes = [cycle.undeclared, *before, *after, *bad.values(), *on.values(), differ]
-        contract, *terms = map(keyed.term, nodes)
-        solver = Solver(LIMITS)
-        solver.add(*keyed.ranges, contract)
-        literals = iter(map(solver.switch, terms))
-        return _Frame(
-            solver,
-            [next(literals) for _ in before],
-            [next(literals) for _ in clauses],
-            {key: next(literals) for key in bad},
-            {member: next(literals) for member in on},
-            next(literals),
-        )
+        after = held(predicates, clauses, cycle.after)
+        return Frame.of(
+            cycle.undeclared, (before, after), obligations(loose, cycle), on,
+            exact=self.proof.exact, differs=differ,
+        )  # fmt: skip
 
     # --- what a proof needs ---
 
-    def needed(self, key: Key, on: Collection[Member], clauses: Iterable[int]) -> Needed | None:
-        """Return what shows an obligation with these members on, from clauses that are an invariant then; None where nothing does."""
-        every, waiting = list(clauses), list[Goal]([key, *self._kept])
-        found, members = set[int](), set[Member]()
-        while waiting:
-            core = self._core(waiting.pop(), on, every, found)
-            if core is None:
-                return None
-            waiting += sorted(core.clauses - found, reverse=True)
-            found |= core.clauses
-            members |= core.members
-        return Needed(frozenset(found), frozenset(members))
-
-    def _core(
-        self, goal: Goal, on: Collection[Member], every: Sequence[int], known: Collection[int]
-    ) -> Needed | None:
-        """Return what shows that a cycle fulfils an obligation, or keeps a clause; as few clauses as possible besides the known ones."""
-        clauses, members = set[int](), set[Member]()
-        for frame in self._frames:
-            held_ = dict(zip(frame.before(every), every, strict=False))
-            switches = {term: member for member, term in frame.on.items() if member in on}
-            bad = frame.broken[goal] if isinstance(goal, int) else frame.bad[goal]
-            left = frame.refuted((*held_, *switches), bad)
-            if left is None:
-                return None
-            for term in [term for term in left if term in held_ and held_[term] not in known]:
-                if term in left:
-                    left = frame.refuted([other for other in left if other is not term], bad) or left
-            clauses |= {held_[term] for term in left if term in held_}
-            members |= {switches[term] for term in left if term in switches}
-        return Needed(frozenset(clauses), frozenset(members))
+    def needed(self, goals: Iterable[Goal], on: Collection[Member], clauses: Iterable[int]) -> Needed | None:
+        """Return what shows these goals with these members on, from clauses that are an invariant then; None where nothing does."""
+        return needed(self._frames, [*goals, *self._kept], on, clauses)
 
     # --- what is left of an invariant ---
 
@@ -223,9 +221,53 @@ class Questions:
         """Return whether every cycle leaves what it would leave if all members were on."""
         return all(self._refutes(frame, on, self.clauses, frame.differs) for frame in self._frames)
 
-    def _refutes(self, frame: _Frame, on: Collection[Member], clauses: Sequence[int], bad: Term) -> bool:
+    def _refutes(self, frame: Frame, on: Collection[Member], clauses: Sequence[int], bad: Term) -> bool:
         asked = frame.solver.switch(bad)
         return frame.solver.check(*frame.just(on), *frame.before(clauses), asked) is Answer.UNSATISFIABLE
+
+
+def needed(
+    frames: Sequence[Frame],
+    goals: Iterable[Goal],
+    on: Collection[Member],
+    clauses: Iterable[int],
+    shown_here: Collection[int] | None = None,
+) -> Needed | None:
+    """Return what shows these goals with these members on, from clauses that are an invariant then; None where nothing does.
+
+    Clauses that are not `shown_here` are taken as they are; of None all are.
+    """
+    every, waiting = list(clauses), list(goals)
+    found, members = set[int](), set[Member]()
+    while waiting:
+        core = _core(frames, waiting.pop(), on, every, found)
+        if core is None:
+            return None
+        new = core.clauses - found
+        waiting += sorted(new if shown_here is None else new & frozenset(shown_here), reverse=True)
+        found |= core.clauses
+        members |= core.members
+    return Needed(frozenset(found), frozenset(members))
+
+
+def _core(
+    frames: Sequence[Frame], goal: Goal, on: Collection[Member], every: Sequence[int], known: Collection[int]
+) -> Needed | None:
+    """Return what shows that a cycle fulfils an obligation, or keeps a clause; as few clauses as possible besides the known ones."""
+    clauses, members = set[int](), set[Member]()
+    for frame in frames:
+        held_ = dict(zip(frame.before(every), every, strict=False))
+        switches = {term: member for member, term in frame.on.items() if member in on}
+        bad = frame.broken[goal] if isinstance(goal, int) else frame.bad[goal]
+        left = frame.refuted((*held_, *switches), bad)
+        if left is None:
+            return None
+        for term in [term for term in left if term in held_ and held_[term] not in known]:
+            if term in left:
+                left = frame.refuted([other for other in left if other is not term], bad) or left
+        clauses |= {held_[term] for term in left if term in held_}
+        members |= {switches[term] for term in left if term in switches}
+    return Needed(frozenset(clauses), frozenset(members))
 
 
 def with_program(ts: TransitionSystem, program: Program, like: TransitionSystem) -> TransitionSystem:

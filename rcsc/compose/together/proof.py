@@ -207,9 +207,13 @@ class Question:
     def _lemmas(self, names: Iterable[str], around: Surroundings) -> Iterator["Lemma"]:
         """Yield the invariants of these levels, each proved of the level alone, in surroundings that are as hard."""
         for name in names:
-            if (proof := self.proofs.get(name)) is not None:
-                known = proof.parts[0] if proof.parts and around.refuses else proof
+            if (known := self.proof_of(name, around)) is not None:
                 yield Lemma(name, known.predicates, known.clauses)
+
+    def proof_of(self, name: str, around: Surroundings) -> LevelProof | None:
+        """Return the proof of a level alone, in surroundings that are as hard."""
+        proof = self.proofs.get(name)
+        return proof.parts[0] if proof is not None and proof.parts and around.refuses else proof
 
     def _parts(self) -> Iterator[tuple[Timing, tuple[str, ...]]]:
         named = self._named()
@@ -255,6 +259,15 @@ class Question:
             } & self.systems.keys()
         yield from (name for name in self.systems if name in here)
 
+    def invariant(self, found: Across) -> "tuple[Together, Shown] | None":
+        """Return the levels of a proof, and an invariant that shows the requirement of them once more."""
+        if not found.proved:
+            return None
+        ts = self._together(found.levels, found.timing, found.around)
+        lemmas = tuple(self._lemmas(found.levels, found.around))
+        again = shown(ts, lemmas, exact=bool(found.by))
+        return None if again is None else (ts, again)
+
     def _together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
         systems = {
             name: ts.refusing() if around.refuses else ts.admitting() for name, ts in self.systems.items()
@@ -285,7 +298,29 @@ class Lemma:
 
 
 def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -> str | None:
-    """Prove the requirement of levels together; return how, in words, or None.
+    """Prove the requirement of levels together; return how, in words, or None."""
+    found = shown(ts, lemmas, exact=exact)
+    return None if found is None else found.by
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """An invariant that shows a requirement, as Z3 confirmed it.
+
+    Attributes:
+        by: How it was found, in words; empty for the search over predicates.
+        exact: Whether it is confirmed only of terms in which all arithmetic of integers is exact.
+        known: Those of its clauses that are of a level, which a level's own proof shows: of which level, and where they stand there.
+    """
+
+    invariant: FoundInvariant
+    by: str = ""
+    exact: bool = False
+    known: Mapping[Clause, tuple[str, int]] = field(default_factory=dict)
+
+
+def shown(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -> Shown | None:
+    """Find an invariant that shows the requirement of levels together.
 
     Args:
         ts: The levels.
@@ -300,7 +335,8 @@ def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -
     owed = [*(obligations(ts, first) for first in firsts), wanted]
     known = tuple(of_member(one, lemma.level) for lemma in lemmas for one in lemma.predicates)
     chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
-    held = tuple(_clauses(ts, chosen, lemmas))
+    of_levels = dict(_clauses(ts, chosen, lemmas))
+    held = tuple(of_levels)
     found, by = _searched((*firsts, step), owed, chosen, held), ""
     if exact:
         more = helped(ts, firsts, step, wanted, found, MOST_STEPS)
@@ -310,7 +346,7 @@ def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -
     for integers in (False, True) if by else (False,):
         with suppress(NotConfirmedError, GaveUpError):
             confirm_owed(found, firsts, step, owed, LIMITS, known=held, exact=integers)
-            return by
+            return Shown(found, by, integers, of_levels)
     return None
 
 
@@ -335,8 +371,10 @@ def goes_on(ts: Together, firsts: Sequence[Cycle], step: Cycle) -> bool:
     return False
 
 
-def _clauses(ts: Together, chosen: Sequence[Predicate], lemmas: Iterable[Lemma]) -> Iterator[Clause]:
-    """Yield the clauses of lemmas over these predicates, which hold in every state in which a later tick begins.
+def _clauses(
+    ts: Together, chosen: Sequence[Predicate], lemmas: Iterable[Lemma]
+) -> Iterator[tuple[Clause, tuple[str, int]]]:
+    """Yield the clauses of lemmas over these predicates, which hold in every state in which a later tick begins, and where each stands.
 
     They hold after each cycle of their level. Where it need not run in the first tick, only those are yielded that hold before its first
     cycle, too.
@@ -344,10 +382,10 @@ def _clauses(ts: Together, chosen: Sequence[Predicate], lemmas: Iterable[Lemma])
     places, start = {one.name: at for at, one in enumerate(chosen)}, ts.initial()
     for lemma in lemmas:
         own = [places[of_member(one, lemma.level).name] for one in lemma.predicates]
-        for clause in lemma.clauses:
+        for place, clause in enumerate(lemma.clauses):
             placed = tuple(sorted((own[at], value) for at, value in clause))
             if ts.timing is Timing.SCHEDULED or _holds(chosen, placed, start):
-                yield placed
+                yield placed, (lemma.level, place)
 
 
 def _holds(chosen: Sequence[Predicate], clause: Clause, state: Leaves) -> bool:

@@ -233,7 +233,10 @@ def _unspoken_of(program: Program, coverage: "Coverage") -> Iterator[tuple[Span,
         for line in table.every_line:
             at = str(table.name), str(line.name)
             if leaves := dict.fromkeys(left.get(at, ())):
-                yield line.span, f"no requirement speaks of what it writes to {', '.join(leaves)}"
+                yield (
+                    line.span,
+                    f"no requirement of the level speaks of what it writes to {', '.join(leaves)}",
+                )
             if at in silent:
                 yield (
                     line.span,

@@ -1,7 +1,7 @@
 """What `rcsc prove` says of requirements across levels: first of all, for they are what the levels are for."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,10 @@ from rcsc.compose.contract.claims import declared
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings
 from rcsc.compose.counterexample.finding import rows
+from rcsc.compose.coverage.covered import Coverage
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
+from rcsc.compose.together.needed import core_across
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, Across, Question, Surroundings
 from rcsc.compose.together.repeated import finding_of, repeated
@@ -24,6 +26,7 @@ from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.systems.explained import say_exercise, say_run
+from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
@@ -36,12 +39,12 @@ class Answers:
     """The answers to all requirements across the levels of a system.
 
     Attributes:
-        file: The file that states them.
+        program: The file that states them, resolved.
         loaded: The file, and all that it uses.
         every: The answers, each with its run as the executors repeated it, where there is one.
     """
 
-    file: str
+    program: Program
     loaded: Loaded
     every: tuple[tuple[Across, Explanation | None], ...]
 
@@ -72,7 +75,7 @@ def answers(
     for one in program.properties:
         found = answered(Question(systems, settings.system, program, one, proofs), cache)
         every.append((found, repeated(found, systems, settings) if found.run else None))
-    return Answers(program.file, loaded, tuple(every))
+    return Answers(program, loaded, tuple(every))
 
 
 def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found: Across) -> str:
@@ -94,7 +97,7 @@ def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found:
 
 def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers) -> Iterator[str]:
     """Yield a line for each requirement."""
-    yield click.style(f"requirements across levels, {Path(given.file).name}", bold=True)
+    yield click.style(f"requirements across levels, {Path(given.program.file).name}", bold=True)
     for found, _ in given.every:
         yield f"  {found.stated.name:24} {standing(systems, whole, found)}"
 
@@ -156,6 +159,27 @@ def shows(systems: Mapping[str, TransitionSystem], settings: TraceSettings, name
         return False
     say_exercise(systems, finding_of(asking), f"`{name}` across levels")
     return True
+
+
+def covered(
+    systems: Mapping[str, TransitionSystem],
+    whole: SystemProof,
+    settings: TraceSettings,
+    given: Answers | None,
+    coverages: Mapping[str, Coverage],
+) -> dict[str, Coverage]:
+    """Return the coverage of levels with what requirements across levels need of each."""
+    cores = []
+    proofs = {proof.level: proof for proof in whole.levels}
+    for found, _ in () if given is None else given.every:
+        assert given is not None
+        cores.append(
+            core_across(Question(systems, settings.system, given.program, found.stated, proofs), found)
+        )
+    return {
+        level: replace(one, across=tuple((core.name, core.of(level)) for core in cores))
+        for level, one in coverages.items()
+    }
 
 
 def as_json(

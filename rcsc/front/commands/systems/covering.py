@@ -21,20 +21,27 @@ MOST = 40
 def lines_of(coverage: Coverage, sources: Sources) -> Iterator[str]:
     """Yield what is to be printed of the coverage of a level."""
     title = click.style(f"coverage of level {coverage.level}", bold=True)
-    if not coverage.requirements:
-        yield f"{title}  no property and no requirement is stated of it: none speaks of any line"
+    if not coverage.requirements and not coverage.across:
+        own = (
+            "stated of it"
+            if coverage.across is not None
+            else "its own; those across levels were not looked at"
+        )
+        yield f"{title}  no property and no requirement is {own}: none speaks of any line"
         return
-    yield f"{title}  {counted(coverage.requirements, 'requirement')}"
+    across = f", and {len(coverage.across)} across levels" if coverage.across else ""
+    yield f"{title}  {counted(coverage.requirements, 'requirement')}{across}"
     for key in coverage.unproved:
         yield f"  {_word(key)} is not proved: what it needs is not known"
     for key in coverage.again:
         yield f"  {_word(key)}: Z3 did not show it once more within its steps: what it needs is not known"
     for core in coverage.cores:
         yield from _core(core, sources)
-    if coverage.cores:
-        every = len(coverage.cores) == coverage.requirements
-        who = "no requirement" if every else "none of these requirements"
-        yield from _told(f"{who} speaks of", _places(coverage.unneeded, sources))
+    for name, uses in coverage.across or ():
+        yield from _of_across(name, uses, sources)
+    if coverage.cores or any(uses is not None for _, uses in coverage.across or ()):
+        who = "no requirement" if coverage.complete else "none of these requirements"
+        yield from _told(f"{who} speaks of", _places(coverage.silent, sources))
         yield from _told(
             "assumptions that no requirement needs", (f"`{one}`" for one in coverage.assumptions)
         )
@@ -47,19 +54,38 @@ def _word(key: Key) -> str:
 
 def _core(core: Core, sources: Sources) -> Iterator[str]:
     few = ", no fewer" if core.minimal else "; whether fewer suffice is not known"
-    yield f"  {_word(core.key)} needs {counted(len({use.part for use in core.uses}), 'assignment')}{few}"
+    yield f"  {_word(core.key)} needs {_counted(core.uses)}{few}"
+    yield from _uses(core.uses, sources)
+    if core.assumptions:
+        yield f"    assuming {named([f'`{name}`' for name in core.assumptions])}"
+
+
+def _of_across(name: str, uses: Sequence[Use] | None, sources: Sources) -> Iterator[str]:
+    """Yield what a requirement across levels needs of one."""
+    if uses is None:
+        yield f"  requirement `{name}` across levels: what it needs is not known"
+        return
+    few = "; whether fewer suffice is not known" if uses else ""
+    yield f"  requirement `{name}` across levels needs {_counted(uses) if uses else 'no assignment'} of it{few}"
+    yield from _uses(uses, sources)
+
+
+def _counted(uses: Sequence[Use]) -> str:
+    return counted(len({use.part for use in uses}), "assignment")
+
+
+def _uses(every: Sequence[Use], sources: Sources) -> Iterator[str]:
+    """Yield the lines in which uses are, and what procedures write there."""
     inside = dict[str, list[Use]]()
-    for use in core.uses:
+    for use in every:
         inside.setdefault(use.table, []).append(use)
     for table, uses in inside.items():
         names = dict.fromkeys(use.line for use in uses)
         what = f"table {table}" if table else "in every cycle"
         yield f"    {what}: {', '.join(names)}"
-    if written := dict.fromkeys(use.part for use in core.uses if use.part.procedure):
+    if written := dict.fromkeys(use.part for use in every if use.part.procedure):
         texts = dict.fromkeys(f"{part.procedure}: {_text(part, sources)}" for part in written)
         yield f"    of procedures {'; '.join(texts)}"
-    if core.assumptions:
-        yield f"    assuming {named([f'`{name}`' for name in core.assumptions])}"
 
 
 def _told(heading: str, every: Iterable[str]) -> Iterator[str]:
@@ -107,7 +133,7 @@ def _slips(coverage: Coverage, sources: Sources) -> Iterator[str]:
     offered = {each.slip: each.text for each in coverage.offers}
     surviving = [(at, one) for at, one in enumerate(coverage.slips) if one.fate is Fate.SURVIVES]
     if surviving:
-        yield "  what can be left out, and everything that is proved still holds"
+        yield "  what can be left out, and everything that is proved of the level still holds"
     for at, one in surviving[:MOST]:
         yield f"    {_slip(one, sources)}"
         if at in offered:
@@ -151,7 +177,14 @@ def coverage_as_json(coverage: Coverage, sources: Sources) -> dict[str, Any]:
             }
             for core in coverage.cores
         ],
-        "no_requirement_speaks_of": [_use_as_json(use, sources) for use in coverage.unneeded],
+        "across_levels": [
+            {
+                "name": name,
+                "assignments": None if uses is None else [_use_as_json(use, sources) for use in uses],
+            }
+            for name, uses in coverage.across or ()
+        ],
+        "no_requirement_speaks_of": [_use_as_json(use, sources) for use in coverage.silent],
         "assumptions_not_needed": list(coverage.assumptions),
         "slips": [
             {

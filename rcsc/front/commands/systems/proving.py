@@ -138,6 +138,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         for level in proof.levels
         if asked.coverage
     }
+    if coverages and not asked.only:
+        coverages = across.covered(systems, proof, settings, given, coverages)
     if not asked.as_json:
         _say(line for each in coverages.values() for line in lines_of(each, sources))
     if given is not None and not asked.as_json:
