@@ -49,7 +49,7 @@ class BadDescription(BadFile):
     """An error in a description, with its place."""
 
 
-LONGEST_MS, MOST_LEVELS, MOST_WITHIN = 3_600_000, 10_000, 1_000_000
+LONGEST_MS, MOST_LEVELS, MOST_WITHIN, MOST_LATE = 3_600_000, 10_000, 1_000_000, 20
 WITHIN = 5000
 """Cycles without a fault in which every command from outside ends, where the description says nothing else."""
 FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
@@ -70,6 +70,7 @@ SYSTEM = Record(
         "data": Text(),
         "data_python": Text(),
         "displays": Entries(Listing(Member())),
+        "late_ticks": Number(1, MOST_LATE, whole=True),
         "outside": Listing(Word()),
         "plant": Entries(Anything()),
         "requirements": Text(),
@@ -156,6 +157,7 @@ class Description:
         script: The orders that are given when nobody says which; None where the description names none.
         within: Cycles without a fault in which every command from outside is to end when the system is tested.
         requirements: The file that says what the levels have to do together; None where the description names none.
+        late_ticks: How late buffers may be read where requirements are proved, beyond the tick that each takes; 0 where nothing is said.
     """
 
     name: str
@@ -171,6 +173,7 @@ class Description:
     data_python: str = ""
     within: int = WITHIN
     requirements: Path | None = None
+    late_ticks: int = 0
 
     def unfilled(self, inputs: Iterable[str]) -> tuple[str, ...]:
         """Return those of these inputs, `level.variable`, that no buffer and no feed fills: they keep their initial values."""
@@ -296,6 +299,7 @@ def _described(
         {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
         within=content.get("campaign", {}).get("within", WITHIN),
+        late_ticks=content.get("late_ticks", 0),
         data_python=content.get("data_python", ""),
     )
 

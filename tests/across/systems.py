@@ -34,8 +34,47 @@ class Drawn:
     files: Mapping[str, str]
 
 
-def drawn(seed: int) -> Drawn:
-    """Draw a system whose levels are `a`, `b` and perhaps `c`, each with inputs `x` and `y`, a state `n` and an output `o`."""
+class LateMemory(CommonMemory):
+    """Common memory of which readers see each buffer as late as is said.
+
+    Attributes:
+        past: What each buffer held after each of the last ticks, the newest last; None where nothing was there.
+        by: How late each is seen.
+        most: How late one is seen at most.
+    """
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self.most = most
+        self.past: dict[str, tuple[Any, ...]] = {}
+        self.by: dict[str, int] = {}
+
+    def latest(self, name: str) -> Any:
+        """Return what the buffer held then."""
+        past = self.past.get(name, ())
+        by = self.by.get(name, 0)
+        return past[-1 - by] if by < len(past) else None
+
+    def written(self) -> CommonMemory:
+        """Return the memory as its writers left it."""
+        memory = CommonMemory()
+        for name, values in self._held.items():
+            memory.publish(name, values)
+        return memory
+
+    def holds(self, names: Any) -> None:
+        """Note what these buffers hold from now on, for a tick."""
+        for name in names:
+            self.past[name] = (*self.past.get(name, ()), self._held.get(name))[-1 - self.most :]
+
+
+def drawn(seed: int, late: int = 0) -> Drawn:
+    """Draw a system whose levels are `a`, `b` and perhaps `c`, each with inputs `x` and `y`, a state `n` and an output `o`.
+
+    Args:
+        seed: Of what is drawn.
+        late: How many ticks late its buffers may be.
+    """
     random = Random(seed)  # noqa: S311  # repeatable on purpose
     names = tuple("abc"[: random.choice((2, 2, 3))])
     files = {"rcsc.toml": 'name = "drawn"\n'}
@@ -48,6 +87,7 @@ def drawn(seed: int) -> Drawn:
     for name in names:
         wires.append(f'"plant.y_{name}" = "{name}.y"')
     tick = 'name = "drawn"\ngenerated = "generated"\ntick_ms = 10\nrequirements = "requirements.rcs"\n'
+    tick += f"late_ticks = {late}\n" if late else ""
     levels = "".join(f'[[level]]\nname = "{name}"\n' for name in names)
     files["system.toml"] = tick + levels + "[buffers]\n" + "\n".join(wires) + "\n"
     files["requirements.rcs"] = (
@@ -117,6 +157,7 @@ class Running:
 
     path: Path
     system: System = field(init=False)
+    memory: LateMemory = field(init=False)
     described: Description = field(init=False)
     program: Program = field(init=False)
     inputs: dict[str, tuple[Any, ...]] = field(init=False)
@@ -133,7 +174,8 @@ class Running:
             running_level(spec, self.described, signs[spec.name], by_level[spec.name], {})
             for spec in self.described.levels
         )
-        self.system = System(self.described, levels, (), CommonMemory())
+        self.memory = LateMemory(self.described.late_ticks)
+        self.system = System(self.described, levels, (), self.memory)
         stated = stated_across(self.described, programs)
         assert stated is not None
         self.program = stated[0]
@@ -142,9 +184,12 @@ class Running:
             for name, ts in systems.items()
         }
         values = tuple(level.values for level in levels)
-        self.begins = values, {}, {level.name: self._inputs(level.name) for level in levels}, {}, 0
+        admitted = {level.name: self._inputs(level.name) for level in levels}
+        self.begins = values, ({}, {}, {}), admitted, {}, 0
 
-    def shortest(self, stated: Property, most: int, *, refuses: bool, restarts: bool) -> int | None:
+    def shortest(
+        self, stated: Property, most: int, *, refuses: bool, restarts: bool, late: bool = False
+    ) -> int | None:
         """Return the number of ticks of the shortest run that breaks a requirement; 0 if none does, None if that is not known.
 
         Args:
@@ -152,6 +197,7 @@ class Running:
             most: No longer run is looked for.
             refuses: Whether inputs may be refused; `restarts`, whether levels may begin anew.
             restarts: Whether levels may begin anew.
+            late: Whether buffers may be seen late.
         """
         names = [level.name for level in self.system.levels]
         watch = Watch(stated) if stated.monitor is not None else None
@@ -163,7 +209,7 @@ class Running:
         for tick in range(most):
             after = []
             for _, kept in here:
-                for values, anew in product(given, again):
+                for values, anew, by in product(given, again, self._ages(kept, late=late)):
                     due = [
                         self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels
                     ]
@@ -178,6 +224,7 @@ class Running:
                         dict(zip(names, anew, strict=True)),
                         watch,
                         stated,
+                        by,
                     )
                     if found is None:
                         return tick + 1
@@ -189,6 +236,41 @@ class Running:
             here = after
         return None
 
+    def walk(
+        self, stated: Property, seed: int, ticks: int, *, refuses: bool, restarts: bool, late: bool
+    ) -> int:
+        """Run so many ticks with whatever comes; return the tick that breaks the requirement, 0 if none does."""
+        random = Random(seed)  # noqa: S311  # repeatable on purpose
+        watch = Watch(stated) if stated.monitor is not None else None
+        values, held, admitted, _, tick = self.begins
+        kept: Any = (values, held, admitted, {} if watch is None else dict(watch.state), tick)
+        for number in range(1, ticks + 1):
+            levels = self._at(kept).levels
+            given = {level.name: random.choice(self._given(level.name, refuses=refuses)) for level in levels}
+            anew = {
+                level.name: restarts
+                and random.random() < 0.1
+                and self.system.tick * 10 % level.level.period_ms == 0
+                for level in levels
+            }
+            found = self._step(
+                kept, given, anew, watch, stated, random.choice(tuple(self._ages(kept, late=late)))
+            )
+            if found is None:
+                return number
+            kept = found[1]
+        return 0
+
+    def _ages(self, kept: Any, *, late: bool) -> Iterator[dict[str, int]]:
+        """Yield how late each buffer may be seen in the next tick."""
+        before = kept[1][2]
+        names = [wire.source for wire in self.described.wires]
+        every = [
+            range(min(self.memory.most, before.get(name, 0) + 1) + 1) if late else (0,) for name in names
+        ]
+        for ages in product(*every):
+            yield dict(zip(names, ages, strict=True))
+
     def _given(self, name: str, *, refuses: bool) -> tuple[Any, ...]:
         return tuple(value for value in self.inputs[name] if refuses or value != 3)
 
@@ -198,11 +280,12 @@ class Running:
 
     def _state(self, admitted: dict[str, tuple[Any, ...]], watch: Watch | None, tick: int) -> tuple[Any, Any]:
         values = tuple(level.values for level in self.system.levels)
-        held = dict(self.system.buffers._held)  # type: ignore[attr-defined]  # a copy
+        memory = self.memory
+        held = dict(memory._held), dict(memory.past), dict(memory.by)
         states = {} if watch is None else dict(watch.state)
         key = (
             values,
-            tuple(sorted(held.items())),
+            tuple(tuple(sorted(of.items())) for of in held),
             tuple(sorted(admitted.items())),
             tuple(states.items()),
             tick % 6,
@@ -213,7 +296,7 @@ class Running:
         values, held, _, _, tick = kept
         for level, of in zip(self.system.levels, values, strict=True):
             level.put_back(of)
-        self.system.buffers._held = dict(held)  # type: ignore[attr-defined]  # as it was
+        self.memory._held, self.memory.past, self.memory.by = map(dict, held)
         self.system.tick = tick
         return self.system
 
@@ -227,17 +310,26 @@ class Running:
         return seen
 
     def _step(
-        self, kept: Any, given: dict[str, Any], anew: dict[str, bool], watch: Watch | None, stated: Property
+        self,
+        kept: Any,
+        given: dict[str, Any],
+        anew: dict[str, bool],
+        watch: Watch | None,
+        stated: Property,
+        late: dict[str, int],
     ) -> tuple[Any, Any] | None:
-        system, (_, held, admitted, states, tick) = self._at(kept), kept
+        system, (_, (held, *_), admitted, states, tick) = self._at(kept), kept
         before = self._seen(admitted, {name: held.get(f"plant.y_{name}", (0,))[0] for name in given})
         for name, value in given.items():
             system.buffers.publish(f"plant.y_{name}", (value,))
+        self.memory.holds(f"plant.y_{name}" for name in given)
+        self.memory.by = late
         for name, begins in anew.items():
             if begins:
-                system.restart(name)
+                system.restart(name, written=self.memory.written())
         with suppress(StateTableError):  # a level was refused an input
             system.step()
+        self.memory.holds(f"{name}.o" for name in given)
         system.tick = tick + 1
         now = dict(admitted)
         for level in system.levels:

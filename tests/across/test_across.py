@@ -7,13 +7,18 @@ from pathlib import Path
 import pytest
 
 from rcsc.compose.counterexample.explain import TraceSettings
+from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NO_RESTART, Across, Question
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question, Surroundings
 from rcsc.compose.together.repeated import repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands import run
-from rcsc.run.description import description
+from rcsc.run.description import Description, description
+from rcsc.run.episodes.episode import BufferFault
+from rcsc.run.episodes.harm import HarmedMemory
+from rcsc.run.levels import running_level
+from rcsc.run.system import System, executors, signatures
 
 Ran = tuple[int, str, str]
 Rcsc = Callable[..., Ran]
@@ -276,6 +281,113 @@ def test_an_assumption_that_is_kept_for_a_while_only_proves_nothing(tmp_path: Pa
     moves = "assume moves assumed : when panel.wish = l, exactly after 3 cycles, panel.wish = r\n"
     found = _answers(_written(tmp_path, stays + moves + "requirement any : never right.runs\n"))["any"]
     assert not found.proved
+
+
+# --- late buffers ------------------------------------------------------------------------------
+
+_HEEDS = "requirement heeds : when boss.go_left for 3 cycles, at once left.runs\n"
+
+
+def _late(folder: Path, requirements: str, ticks: int) -> Path:
+    path = _written(folder, requirements)
+    path.write_text(path.read_text().replace("tick_ms = 10\n", f"tick_ms = 10\nlate_ticks = {ticks}\n"))
+    return path
+
+
+def test_what_holds_as_scheduled_and_not_of_a_buffer_that_is_a_tick_late_is_told_with_a_run(
+    tmp_path: Path,
+) -> None:
+    found = _answers(_late(tmp_path, _BOTH, 1))["never_both"]
+    assert (found.proved, found.timing, found.kinder_timing) == (True, Timing.SCHEDULED, True)
+    assert NEVER_LATE in found.trusts({})
+    assert len(found.run) == 3
+    assert [sorted(late) for late in found.run_late] == [[], [], ["right.go"]]
+    assert found.broken_in == Surroundings(refuses=False, restarts=False)
+
+
+@pytest.mark.parametrize(("ticks", "holds"), [(2, True), (3, False)])
+def test_a_requirement_is_proved_of_buffers_as_late_as_the_system_says(
+    tmp_path: Path, ticks: int, holds: bool
+) -> None:
+    found = _answers(_late(tmp_path, _HEEDS, ticks))["heeds"]
+    assert found.proved
+    assert (found.timing, bool(found.run)) == (Timing.LATE if holds else Timing.SCHEDULED, not holds)
+
+
+def test_what_holds_under_any_timing_is_not_asked_of_late_buffers(tmp_path: Path) -> None:
+    found = _answers(_late(tmp_path, "property one : not (boss.go_left and boss.go_right)\n", 2))["one"]
+    assert (found.proved, found.timing, found.kinder_timing) == (True, Timing.ANY, False)
+
+
+def test_a_run_with_late_buffers_is_one_of_episodes_with_such_faults(tmp_path: Path) -> None:
+    path = _late(tmp_path, _HEEDS, 3)
+    found = _answers(path)["heeds"]
+    assert any(found.run_late)
+    assert not any(step.anew for tick in found.run for step in tick.values())
+    systems, _ = read_systems(path)
+    system = description(path)
+    make((ts.program for ts in systems.values()), system.generated, altered=False)
+    signs = signatures(system)
+    by_level = executors(system, signs, "c")
+    levels = tuple(
+        running_level(spec, system, signs[spec.name], by_level[spec.name], {}) for spec in system.levels
+    )
+    memory = HarmedMemory(_faults(found, system), (), {})
+    running = System(system, levels, (), memory)
+    for tick, ran in enumerate(found.run):
+        memory.begin(tick)
+        memory.publish("panel.wish", (ran["boss"].taken["wish"],))
+        running.step()
+        for level in levels:
+            assert (
+                level.value("go_left" if level.name == "boss" else "runs")
+                == ran[level.name].after["go_left" if level.name == "boss" else "runs"]
+            )
+
+
+def _faults(found: Across, system: Description) -> list[BufferFault]:
+    """Return faults after which each value comes when a reader of the run first sees it, or a later one."""
+    faults = []
+    for wire in system.wires:
+        if wire.source == "panel.wish":
+            continue  # published here as the run takes it
+        seen = [tick - 1 - late.get(wire.target, 0) for tick, late in enumerate(found.run_late)]
+        for tick in range(len(seen)):
+            comes = next((at for at, newest in enumerate(seen) if newest >= tick), len(seen) + 1)
+            if comes > tick + 1:
+                faults.append(BufferFault(wire.source, "late", tick, tick, ticks=comes - tick - 1))
+    return faults
+
+
+def test_prove_says_how_late_buffers_are_and_strict_counts_what_needs_that_none_is(
+    tmp_path: Path, rcsc: Rcsc
+) -> None:
+    path = _late(tmp_path, _BOTH + _HEEDS, 1)
+    status, out, err = rcsc("prove", path, "--no-cache")
+    assert "proved as scheduled, of `boss`, `left`, `right`, trusting no buffer is seen late" in out
+    assert "proved with buffers at most 1 tick late, of `boss`, `left`" in out
+    assert "tick 3: `right.go` is seen 1 tick late" in err
+    assert status == 0
+    assert rcsc("prove", path, "--no-cache", "--strict")[0] == 1
+    _, out, _ = rcsc("prove", path, "--no-cache", "--json")
+    every = {one["name"]: one for one in json.loads(out)["requirements"]}
+    assert every["never_both"]["seen_late"][2] == {"right.go": 1}
+    assert every["heeds"]["timing"] == "late"
+
+
+def test_a_proof_of_buffers_that_are_later_is_asked_anew(tmp_path: Path, rcsc: Rcsc) -> None:
+    for ticks, said in ((2, "at most 2 ticks late"), (3, "proved as scheduled")):
+        _, out, _ = rcsc("prove", _late(tmp_path, _HEEDS, ticks))
+        assert said in out.splitlines()[1]
+
+
+@pytest.mark.parametrize("ticks", ["0", "21", "1.5", '"3"'])
+def test_a_number_of_ticks_that_is_none_is_told(tmp_path: Path, rcsc: Rcsc, ticks: str) -> None:
+    path = _written(tmp_path, _BOTH)
+    path.write_text(path.read_text().replace("tick_ms = 10\n", f"tick_ms = 10\nlate_ticks = {ticks}\n"))
+    status, _, err = rcsc("prove", path, "--no-cache")
+    assert status == 1
+    assert "late_ticks" in err
 
 
 # --- words -------------------------------------------------------------------------------------

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from rcsc.compose.contract.predicates import CLOSELY, Predicate, compared, cone, listed
 from rcsc.compose.contract.properties import counters, every_predicate, side_by_side
 from rcsc.compose.contract.transition import Cycle, Leaves
-from rcsc.compose.together.product import Together
-from rcsc.lang.model import Bool, Int, VariableName
+from rcsc.compose.together.product import LATE, Together, ago
+from rcsc.lang.meaning import spelled
+from rcsc.lang.model import Apply, Bool, Int, Op, Read, VariableName
+from rcsc.lang.over_time.past import number
 from rcsc.proof.symbolic.values import Node
 
 
@@ -41,7 +43,8 @@ def features(ts: Together, cycle: Cycle, wanted: Iterable[Node]) -> tuple[Predic
     inside = cone(cycle, reads)
     own = every_predicate(ts, cycle, reads, CLOSELY)
     counted = side_by_side(ts.program, tuple(_counters(ts, inside)), inside)
-    return unlike((*own, *_of_members(ts, inside), *_of_buffers(ts, inside), *counted))
+    late = _of_late_buffers(ts, inside)
+    return unlike((*own, *_of_members(ts, inside), *_of_buffers(ts, inside), *late, *counted))
 
 
 def unlike(every: Iterable[Predicate]) -> tuple[Predicate, ...]:
@@ -79,10 +82,30 @@ def _of_buffers(ts: Together, inside: frozenset[str]) -> Iterator[Predicate]:
             source = ts.sources.get(f"{name}.{leaf}")
             if source is None or source.party not in ts.members:
                 continue
-            given = f"{source.party}.{source.leaf}"
+            given = source.name
             others = {b if a == leaf else a for a, b in pairs if leaf in (a, b)}
             for other in sorted(f"{name}.{one}" for one in (leaf, *others)):
                 if {given, other} <= inside and ts.kinds[given] == ts.kinds[other]:
                     yield Predicate(given, Bool(), other)
             if listed(ts.kinds[given]) and given in inside:
                 yield Predicate(given, ts.kinds[given])
+
+
+def _of_late_buffers(ts: Together, inside: frozenset[str]) -> Iterator[Predicate]:
+    """Yield by how many ticks a buffer was seen late, what stood in it, and whether that is what its reader has or what was given then."""
+    for end in dict.fromkeys(source.end for source in ts.held.values()):
+        name, kind = f"{LATE} {end}", Int(0, ts.most_late)
+        if name in inside:
+            for ticks in range(1, ts.most_late + 1):
+                late = Apply(Op.GE, (Read(VariableName(name), kind), number(ticks)), Bool())
+                yield Predicate(spelled(late), Bool(), condition=late)
+    for own, source in ts.held.items():
+        stood = [name for ticks in range(1, ts.most_late + 1) if (name := ago(own, ticks)) in inside]
+        yield from (Predicate(name, ts.kinds[name]) for name in stood if listed(ts.kinds[name]))
+        reader, _, leaf = own.partition(".")
+        others = {b if a == leaf else a for a, b in compared(ts.members[reader].program) if leaf in (a, b)}
+        near = [source.name, own, *sorted(f"{reader}.{one}" for one in others)]
+        for at, name in enumerate(stood):
+            for other in (*near, *stood[:at]):
+                if other in inside and ts.kinds[name] == ts.kinds[other]:
+                    yield Predicate(name, Bool(), other)

@@ -47,6 +47,7 @@ def answered(question: Question, cache: Cache | None) -> Across:
             kept.by,
             around,
             vacuous=kept.vacuous,
+            late=question.system.late_ticks,
             assumed=kept.assumed,
         )
     cut_before = smt.cut_short()
@@ -82,6 +83,7 @@ def _key(question: Question) -> str:
         tuple((name, content(ts)) for name, ts in levels.items()),
         wires,
         question.system.tick_ms,
+        question.system.late_ticks,
         replace(question.stated, doc=""),
         question.program.environment,
     )

@@ -4,7 +4,7 @@ In: levels together, a run of their circuit. Out: for each tick the cycles of th
 requirement, by its monitor stepped along the run. `rerun` repeats the same on the Python and the C executors.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rcsc.compose.contract.given import refused
@@ -24,6 +24,19 @@ State = dict[str, Value]
 Ticks = tuple[Mapping[str, CycleRun], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class PlayedRun:
+    """A run of levels; none where it has no ticks.
+
+    Attributes:
+        ticks: The cycle of each level that ran, tick by tick.
+        late: For each tick the readers' ends of buffers that are seen late, with by how many ticks: no more than shows them the same.
+    """
+
+    ticks: Ticks = ()
+    late: tuple[Mapping[str, int], ...] = ()
+
+
 @dataclass(slots=True)
 class Playing:
     """Levels that run tick by tick on the interpreter.
@@ -33,6 +46,7 @@ class Playing:
         found: The states of the monitors of its own requirements; None where they begin.
         admitted: The inputs of each as it last took them: what is refused is not taken.
         given: What stands in the buffers of the parties outside.
+        left: What the levels left after each tick, and `told`, what the parties outside gave in each.
     """
 
     ts: Together
@@ -40,6 +54,8 @@ class Playing:
     found: dict[str, Mapping[str, Value] | None] = field(init=False)
     admitted: dict[str, State] = field(init=False)
     given: State = field(init=False)
+    left: list[Mapping[str, State]] = field(default_factory=list)
+    told: list[State] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.now = {name: dict(initial(member.program)) for name, member in self.ts.members.items()}
@@ -61,23 +77,53 @@ class Playing:
         }
         return state | self.given | {mine: state[same] for mine, same in self.ts.shown.items()}
 
-    def tick(self, asked: Mapping[str, "Asked"]) -> dict[str, CycleRun]:
-        """Run a tick: each level takes what the tick before left."""
-        stood = {name: dict(now) for name, now in self.now.items()}
-        return {
+    def tick(
+        self, asked: Mapping[str, "Asked"], given: State, late: Mapping[str, int]
+    ) -> dict[str, CycleRun]:
+        """Run a tick: each level takes what the tick before left, or what stood in its buffers some ticks before.
+
+        Args:
+            asked: What befalls each level.
+            given: What parties outside give, of what they change.
+            late: By how many ticks each reader's end of a buffer is seen late.
+        """
+        self.given = self.given | given
+        self.told.append(self.given)
+        buffers = {own: self._buffer(own, late) for own in {*self.ts.wired, *self.ts.held}}
+        steps = {
             name: step
             for name in self.ts.members
-            if (step := self._level(name, asked[name], stood)) is not None
+            if (step := self._level(name, asked[name], buffers)) is not None
         }
+        self.left.append({name: dict(now) for name, now in self.now.items()})
+        return steps
 
-    def _level(self, name: str, asked: "Asked", stood: Mapping[str, State]) -> CycleRun | None:
+    def _buffer(self, own: str, late: Mapping[str, int]) -> Value:
+        """Return what an input finds in its buffer in the tick that runs."""
+        end = self.ts.sources[own].end
+        return self._content(own, self.newest(end, len(self.left)) - late.get(end, 0))
+
+    def _content(self, own: str, at: int) -> Value:
+        """Return what the buffer of an input held after a tick, counted from 0; where nothing had arrived, what the input begins with."""
+        (reader, _, leaf), source = own.partition("."), self.ts.sources[own]
+        if at < 0:
+            return initial(self.ts.members[reader].program)[leaf]
+        return (
+            self.left[at][source.party][source.leaf] if own in self.ts.wired else self.told[at][source.name]
+        )
+
+    def newest(self, end: str, now: int) -> int:
+        """Return the tick whose content a reader finds in tick `now` where it is not late: of a party outside, that tick."""
+        return now - any(self.ts.sources[own].end == end for own in self.ts.wired)
+
+    def contents(self, end: str, at: int) -> tuple[Value, ...]:
+        """Return all that a buffer that may be late held after a tick, for one of its readers."""
+        return tuple(self._content(own, at) for own, source in self.ts.held.items() if source.end == end)
+
+    def _level(self, name: str, asked: "Asked", buffers: State) -> CycleRun | None:
         member, before = self.ts.members[name], dict(self.now[name])
         taken = {leaf: self.admitted[name][leaf] for leaf in member.inputs} | dict(asked.taken)
-        if not asked.first:
-            for end, source in self.ts.wired.items():
-                (reader, _, leaf), (writer, _, output) = end.partition("."), source.partition(".")
-                if reader == name:
-                    taken[leaf] = stood[writer][output]
+        taken |= {leaf: buffers[own] for leaf in member.inputs if (own := f"{name}.{leaf}") in buffers}
         if not asked.due:
             return None
         if asked.anew:
@@ -126,7 +172,7 @@ def begun_anew(ts: Together, name: str, stood: State, taken: State, *, first: bo
     return start
 
 
-def played(ts: Together, made: Circuit, run: Run, stated: Property) -> Ticks | None:
+def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun | None:
     """Run a run of the circuit; None where the interpreter does not break the requirement in its last tick, and in no tick before.
 
     Args:
@@ -137,22 +183,73 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> Ticks | N
     """
     playing, watch = Playing(ts), Watch(stated) if stated.monitor is not None else None
     environment = [Watch(one) for one in ts.program.environment]
-    ticks, kept = list[Mapping[str, CycleRun]](), True
+    ticks, ages, kept = list[Mapping[str, CycleRun]](), list[Mapping[str, int]](), True
     for number, given in enumerate(run.given):
         if not kept:
             return None
         tick = made.step.cycle if number else made.firsts[run.begins].cycle
         assert isinstance(tick, Tick)
         before = playing.state
-        ticks.append(playing.tick({name: _asked(ts, tick, name, given, number) for name in ts.members}))
-        playing.given |= _told({leaf: tick.after[leaf] for leaf in ts.given}, given)
+        asked = {name: _asked(ts, tick, name, given, number) for name in ts.members}
+        outside = _told({leaf: tick.after[leaf] for leaf in ts.given}, given)
+        late = {end: int(ticks) for end, ticks in _told(tick.late, given).items()}
+        if not _never_back(ts, late, ages[-1] if ages else {}):
+            return None
+        ticks.append(playing.tick(asked, outside, late))
+        ages.append(late)
         after = playing.state
         if any(step.ends_the_run for step in ticks[-1].values()):
             return None
         if not all(one.keeps(before, after) for one in environment):
             return None
         kept = _keeps(stated, watch, before, after)
-    return None if kept else tuple(ticks)
+    return None if kept else PlayedRun(tuple(ticks), _least_late(playing, ticks, ages))
+
+
+def _never_back(ts: Together, late: Mapping[str, int], before: Mapping[str, int]) -> bool:
+    """Return whether no buffer is seen later than it may be, nor older than in the tick before."""
+    return all(0 <= ticks <= min(ts.most_late, before.get(end, 0) + 1) for end, ticks in late.items())
+
+
+def plainest(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun | None:
+    """Run a run of the circuit as `played` does, without those restarts and late buffers that it breaks the requirement without.
+
+    Where parties outside keep to a contract all are kept: they might not do the same of a run that is another.
+    """
+    found = played(ts, made, run, stated)
+    links = [member.links for member in ts.members.values()]
+    if found is None or any(one.asked or one.below or one.above is not None for one in links):
+        return found
+    for at in range(len(run.given)):
+        tick = made.step.cycle if at else made.firsts[run.begins].cycle
+        assert isinstance(tick, Tick)
+        for node in (*tick.restarts.values(), *tick.late.values()):
+            if not node.known and run.given[at].get(node.name):
+                without = ({**one, node.name: 0} if at == of else one for of, one in enumerate(run.given))
+                other = replace(run, given=tuple(without))
+                if (plainer := played(ts, made, other, stated)) is not None:
+                    run, found = other, plainer
+    return found
+
+
+def _least_late(
+    playing: Playing, ticks: Sequence[Mapping[str, CycleRun]], ages: Sequence[Mapping[str, int]]
+) -> tuple[dict[str, int], ...]:
+    """Return for each tick how late buffers were seen, as little as that shows their readers the same."""
+    shown: list[dict[str, int]] = [{} for _ in ticks]
+    for end in dict.fromkeys(source.end for source in playing.ts.held.values()):
+        reader, last = end.partition(".")[0], len(ticks)
+        for at in range(len(ticks) - 1, -1, -1):
+            by = ages[at].get(end, 0)
+            last = min(last, playing.newest(end, at))
+            if reader not in ticks[at]:
+                continue  # nobody looks
+            seen = playing.contents(end, playing.newest(end, at) - by)
+            while playing.contents(end, last) != seen:
+                last -= 1
+            if late := playing.newest(end, at) - last:
+                shown[at][end] = late
+    return tuple(shown)
 
 
 def _keeps(stated: Property, watch: Watch | None, before: State, after: State) -> bool:

@@ -3,10 +3,12 @@
 In: the levels, each with its environment, the buffers between them, and a program of requirements across levels (`resolve_across`). Out:
 `Together`, a transition system like any other: so the engines, the confirmation and the counterexamples of a level serve it, too.
 
-Two timings:
+Three timings:
 
 - *scheduled*: the ticks that `rcsc run` and the C of the system make. A level that is due takes what the tick before left in its buffers,
   all run, all give. Before the first tick buffers are empty, and inputs stand as they are declared.
+- *late*: the same ticks, and what a level takes may be older by some ticks more, at most so many: of each buffer another number in each
+  tick, for each of its readers, but never such that it sees something older than it has seen. Where nothing has arrived it is empty.
 - *any*: each level runs in a tick or not, as it happens, and takes of the others whatever the contract of its own proof allows: any value
   that they published, late, twice or never (`compose.__doc__`). What holds so holds of every schedule and every network.
 
@@ -46,12 +48,15 @@ from rcsc.run.description import Description
 
 NOW = f"{GHOST}tick"
 """The ghost that counts ticks, as far as periods differ."""
+LATE = f"{GHOST}late"
+"""Of ghosts: by how many ticks a reader last saw a buffer late, and what it held some ticks ago."""
 
 
 class Timing(StrEnum):
     """When levels run, and how old what they take of each other is."""
 
     ANY = "any"
+    LATE = "late"
     SCHEDULED = "scheduled"
 
 
@@ -61,12 +66,14 @@ class Tick(Cycle):
 
     Attributes:
         restarts: For each level, that it begins anew before it; `refuses`, that it is refused an input if it runs.
-        takes: For each level, what it takes of what no level in it writes.
+        takes: For each level, what it takes of what no buffer here holds.
+        late: For each buffer and reader, by the reader's end, how late it is seen.
     """
 
     restarts: Mapping[str, Node] = field(default_factory=dict)
     refuses: Mapping[str, Node] = field(default_factory=dict)
     takes: Mapping[str, Leaves] = field(default_factory=dict)
+    late: Leaves = field(default_factory=dict)
 
     @property
     def cases(self) -> tuple[Node, ...]:
@@ -80,10 +87,17 @@ class Source:
 
     Attributes:
         party: Who writes them; `leaf`, under which name.
+        end: The reader's end of the buffer, which may hold more leaves.
     """
 
     party: str
     leaf: str
+    end: str
+
+    @property
+    def name(self) -> str:
+        """The leaf under the name of its party."""
+        return f"{self.party}.{self.leaf}"
 
 
 @dataclass(slots=True)
@@ -95,7 +109,11 @@ class Together(TransitionSystem):
         sources: For each input of a level, as `LEVEL.leaf`, who writes it, where a buffer says so.
         systems: The names of all levels, those that do not run here, too.
         periods: The period of each level, in ticks.
+        wired: Each input that takes what a level here gave in the tick before, with that output.
+        given: What parties outside give to these levels, with its type.
+        held: Each input whose buffer may be seen late, with who writes it: a level here, or a party outside.
         restarting: Whether levels may begin anew.
+        most_late: How many ticks late buffers are seen at most, where timing is *late*.
     """
 
     members: Mapping[str, TransitionSystem] = field(default_factory=dict)
@@ -104,9 +122,15 @@ class Together(TransitionSystem):
     periods: Mapping[str, int] = field(default_factory=dict)
     timing: Timing = Timing.SCHEDULED
     restarting: bool = True
+    most_late: int = 0
+    wired: dict[str, str] = field(init=False)
+    given: dict[str, Scalar] = field(init=False)
+    held: dict[str, Source] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Derive the leaves: those of all levels, of what stands outside, and of the monitors."""
+        """Derive the leaves: those of all levels, of what stands outside, of buffers that are seen late, and of the monitors."""
+        self.wired, self.given = self._wired(), self._given_outside()
+        self.held = self._held()
         self.procedures = {}
         self.inputs = ()
         self.kinds = {
@@ -116,18 +140,31 @@ class Together(TransitionSystem):
             self.kinds.setdefault(str(variable.name), variable.type)
         for _, monitor in monitors(self.program):
             self.kinds |= {str(state.name): state.type for state in monitor.states}
-        if self._round > 1 and self.timing is Timing.SCHEDULED:
+        if self._round > 1 and self.timing is not Timing.ANY:
             self.kinds[NOW] = Int(0, self._round - 1)
+        for own, source in self.held.items():
+            self.kinds[f"{LATE} {source.end}"] = Int(0, self.most_late)
+            level, _, leaf = own.partition(".")
+            for ticks in range(1, self.most_late + 1):
+                self.kinds[ago(own, ticks)] = self.members[level].kinds[leaf]
 
-    @property
-    def wired(self) -> dict[str, str]:
-        """Each input that takes what a level here gave in the tick before, with that output."""
+    def _wired(self) -> dict[str, str]:
         if self.timing is Timing.ANY:
             return {}
         return {
-            end: f"{source.party}.{source.leaf}"
+            end: source.name
             for end, source in self.sources.items()
             if source.party in self.members and end.partition(".")[0] in self.members
+        }
+
+    def _held(self) -> dict[str, Source]:
+        if self.timing is not Timing.LATE:
+            return {}
+        inputs = {f"{name}.{leaf}": ts.kinds[leaf] for name, ts in self.members.items() for leaf in ts.inputs}
+        return {
+            own: self.sources[own]
+            for own, kind in inputs.items()
+            if own in self.wired or (own in self.sources and self.given.get(self.sources[own].name) == kind)
         }
 
     @property
@@ -135,14 +172,8 @@ class Together(TransitionSystem):
         """After how many ticks the same levels are due again."""
         return lcm(*(self.periods[name] for name in self.members))
 
-    @property
-    def given(self) -> dict[str, Scalar]:
-        """What parties outside give to these levels, with its type."""
-        read = {
-            f"{source.party}.{source.leaf}"
-            for end, source in self.sources.items()
-            if end.partition(".")[0] in self.members
-        }
+    def _given_outside(self) -> dict[str, Scalar]:
+        read = {source.name for end, source in self.sources.items() if end.partition(".")[0] in self.members}
         return {
             str(v.name): v.type for v in self.program.variables if v.kind is Kind.INPUT and v.name in read
         }
@@ -151,7 +182,7 @@ class Together(TransitionSystem):
     def shown(self) -> dict[str, str]:
         """What parties outside take of these levels, with the leaf that it is."""
         return {
-            end: f"{source.party}.{source.leaf}"
+            end: source.name
             for end, source in self.sources.items()
             if source.party in self.members and end.partition(".")[0] not in self.systems
         }
@@ -166,6 +197,9 @@ class Together(TransitionSystem):
         start |= {name: values.constant(kind, first[name]) for name, kind in self.given.items()}
         if NOW in self.kinds:
             start[NOW] = values.constant(self.kinds[NOW], 0)
+        for own, source in self.held.items():
+            start[f"{LATE} {source.end}"] = values.constant(Int(0, self.most_late), 0)
+            start |= {ago(own, ticks): start[own] for ticks in range(1, self.most_late + 1)}
         return {**start, **first_ghosts(self.program)}
 
     def firsts(self) -> dict[str, Cycle]:
@@ -181,7 +215,7 @@ class Together(TransitionSystem):
         return self._tick(before, suffix, first=False)
 
     def _tick(self, before: Leaves, suffix: str, *, first: bool) -> Tick:
-        cycles = dict[str, Cycle]()
+        cycles, late = dict[str, Cycle](), self._late(suffix)
         due, restarts, takes = dict[str, Node](), dict[str, Node](), dict[str, Leaves]()
         after = dict(before)
         for name, ts in self.members.items():
@@ -189,8 +223,9 @@ class Together(TransitionSystem):
             restarts[name] = FALSE
             if self.restarting:  # before a cycle of it: what it gave last stands until then
                 restarts[name] = values.variable(f"{name} begins anew{suffix}", Bool())
-            taken = self._taken(name, before, suffix, first=first)
-            takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in self.wired}
+            taken = self._taken(name, before, suffix, late, first=first)
+            held = {*self.wired, *self.held}
+            takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in held}
             stood = {leaf: before[f"{name}.{leaf}"] for leaf in ts.kinds}
             start = _or(restarts[name], self._anew(name, stood, taken, suffix, first=first), stood)
             cycles[name] = ts.cycle(start, f" of {name}{suffix}", taken)
@@ -202,8 +237,10 @@ class Together(TransitionSystem):
         after |= {name: values.variable(f"{name}{suffix}", kind) for name, kind in self.given.items()}
         if NOW in self.kinds:
             after[NOW] = self._counted(before[NOW])
+        after |= self._ages(before, suffix, late, first=first)
         after |= ghosts_after(self.program, before, after, Refusals())
         contract = values.all_of(values.follows(due[name], each.contract) for name, each in cycles.items())
+        contract = values.both(contract, self._never_back(before, late))
         if self.program.environment:
             contract = values.both(contract, kept(self.program, before, after))
         tables = tuple(
@@ -216,6 +253,7 @@ class Together(TransitionSystem):
             calls=tuple(call for each in cycles.values() for call in each.calls),
             restarts=restarts,
             takes=takes,
+            late=late,
             refuses={name: each.untaken for name, each in cycles.items()},
         )  # fmt: skip
 
@@ -252,22 +290,64 @@ class Together(TransitionSystem):
         later = values.arithmetic(Op.ADD, (now, values.constant(Int(1, 1), 1)), following)
         return values.arithmetic(Op.MOD, (later, values.constant(Int(many, many), many)), now.kind)
 
-    def _taken(self, name: str, before: Leaves, suffix: str, *, first: bool) -> Leaves:
+    def _taken(self, name: str, before: Leaves, suffix: str, late: Leaves, *, first: bool) -> Leaves:
         """Return the inputs that a level takes: of other levels what they gave last, of parties outside what stands in their buffers.
 
-        Where that may be late, or its type is another one for this level, it is any value.
+        Of a buffer that it sees late it takes what stood there then. Where that may be of any age, or its type is another one for this
+        level, it is any value.
         """
-        ts, taken, wired, given = self.members[name], {}, self.wired, self.given
-        for leaf in ts.inputs:
+        held, taken = self.held, {}
+        for leaf in self.members[name].inputs:
             own = f"{name}.{leaf}"
-            if own in wired:
-                taken[leaf] = before[own if first else wired[own]]
-                continue
-            source, kind = self.sources.get(own), ts.kinds[leaf]
-            stands = "" if source is None else f"{source.party}.{source.leaf}"
-            same = self.timing is Timing.SCHEDULED and given.get(stands) == kind
-            taken[leaf] = values.variable(f"{stands if same else own}{suffix}", kind)
+            taken[leaf] = self._newest(name, leaf, before, suffix, first=first)
+            for ticks in range(1, self.most_late + 1) if own in held else ():
+                by = late[held[own].end]
+                then = values.equal(by, values.constant(by.kind, ticks))
+                taken[leaf] = values.choice(then, before[ago(own, ticks)], taken[leaf])
         return taken
+
+    def _newest(self, name: str, leaf: str, before: Leaves, suffix: str, *, first: bool) -> Node:
+        """Return what stands in the buffer of an input as a tick begins; of a party outside, what it gives then."""
+        own = f"{name}.{leaf}"
+        if own in self.wired:
+            return before[own if first else self.wired[own]]  # at first it is empty
+        source, kind = self.sources.get(own), self.members[name].kinds[leaf]
+        same = source is not None and self.timing is not Timing.ANY and self.given.get(source.name) == kind
+        return values.variable(f"{source.name if source is not None and same else own}{suffix}", kind)
+
+    def _late(self, suffix: str) -> Leaves:
+        """Return by how many ticks each buffer is seen late, at the end of each reader."""
+        ends = dict.fromkeys(source.end for source in self.held.values())
+        return {end: values.variable(f"{end} is late{suffix}", Int(0, self.most_late)) for end in ends}
+
+    def _never_back(self, before: Leaves, late: Leaves) -> Node:
+        """Return the condition that no reader sees something older than in the tick before."""
+        kept = TRUE
+        for end, now in late.items():
+            then = before[f"{LATE} {end}"]
+            for ticks in range(2, self.most_late + 1):
+                old = range(ticks - 1, self.most_late + 1)
+                so_late = values.any_of(values.equal(then, values.constant(then.kind, of)) for of in old)
+                kept = values.both(
+                    kept, values.follows(values.equal(now, values.constant(now.kind, ticks)), so_late)
+                )
+        return kept
+
+    def _ages(self, before: Leaves, suffix: str, late: Leaves, *, first: bool) -> Leaves:
+        """Return what the next tick finds of late buffers: how late they were seen, and what stood in them."""
+        after = {f"{LATE} {end}": node for end, node in late.items()}
+        for own in self.held:
+            name, _, leaf = own.partition(".")
+            stood = self._newest(name, leaf, before, suffix, first=first)
+            for ticks in range(1, self.most_late + 1):
+                after[ago(own, ticks)] = stood
+                stood = before[ago(own, ticks)]
+        return after
+
+
+def ago(own: str, ticks: int) -> str:
+    """Return the ghost of what stood so many ticks ago in the buffer of an input."""
+    return f"{LATE} {ticks} {own}"
 
 
 def _or(when: Node, these: Leaves, others: Leaves) -> Leaves:
@@ -303,8 +383,7 @@ def together(
     chosen = [name for name in systems if name in set(names)]
     sources = dict(_sources(system, systems))
     members = {
-        name: _linked(systems[name], chosen) if timing is Timing.SCHEDULED else systems[name]
-        for name in chosen
+        name: systems[name] if timing is Timing.ANY else _linked(systems[name], chosen) for name in chosen
     }
     level = Level(system.name, system.tick_ms, (), OneTable(TableName("")), ())
     return Together(
@@ -318,6 +397,7 @@ def together(
         systems=frozenset(systems),
         periods={name: max(1, systems[name].level.period_ms // system.tick_ms) for name in chosen},
         timing=timing,
+        most_late=system.late_ticks,
     )
 
 
@@ -327,7 +407,7 @@ def _known(chosen: Collection[str], sources: Mapping[str, Source]) -> Iterator[s
     for end, source in sources.items():
         reader = end.partition(".")[0]
         if reader in chosen:
-            yield f"{source.party}.{source.leaf}"
+            yield source.name
         if source.party in chosen:
             yield end
 
@@ -362,7 +442,7 @@ def _sources(system: Description, systems: Mapping[str, TransitionSystem]) -> It
         (reader, _, record), (party, _, output) = wire.target.partition("."), wire.source.partition(".")
         if reader in systems:
             for leaf in leaves_under(systems[reader].program, record):
-                yield f"{reader}.{leaf}", Source(party, output + leaf[len(record) :])
+                yield f"{reader}.{leaf}", Source(party, output + leaf[len(record) :], wire.target)
         elif party in systems:
             for leaf in leaves_under(systems[party].program, output):
-                yield f"{reader}.{record}{leaf[len(output) :]}", Source(party, leaf)
+                yield f"{reader}.{record}{leaf[len(output) :]}", Source(party, leaf, wire.target)

@@ -2,9 +2,10 @@
 
 In: the levels of a system, each proved alone or not, and the program of a file of requirements. Out: for each an `Across`.
 
-A requirement is tried first under *any* timing, of the levels that it names. Then under the *scheduled* one: of these levels, then with
-the levels that write to them, and so on: what is left out may do all that its contract allows, so that a proof of few levels is one of
-all, and costs what they cost. A run is looked for of all levels together, and shown only if the interpreter does it.
+A requirement is tried first under *any* timing, of the levels that it names. Then under the *late* one, where the system says how late its
+buffers may be, and then under the *scheduled* one: of these levels, then with the levels that write to them, and so on: what is left out
+may do all that its contract allows, so that a proof of few levels is one of all, and costs what they cost. A run is looked for of all
+levels together, and shown only if the interpreter does it.
 
 1. short runs, by bounded search;
 2. invariants over predicates of all levels, confirmed by Z3; what these leave open goes to the exact engines (`exact.portfolio`);
@@ -32,7 +33,7 @@ from rcsc.compose.invariant.search import LIMITS, FoundInvariant
 from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
 from rcsc.compose.together.features import features, of_member, unlike
-from rcsc.compose.together.played import Ticks, played
+from rcsc.compose.together.played import PlayedRun, Ticks, plainest
 from rcsc.compose.together.product import Timing, Together, read_by_all, together
 from rcsc.lang.model import Program, Property
 from rcsc.lang.over_time.past import TRUE, negation
@@ -45,6 +46,8 @@ MOST_STEPS = 10_000_000
 """What Spacer gets for a requirement, in steps: less than 10 s."""
 NO_RESTART = "no level begins anew while the system runs"
 """What is trusted where levels do not begin anew."""
+NEVER_LATE = "no buffer is seen late"
+"""What is trusted where the system says that buffers may be, and a requirement is proved only of such as are not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +80,8 @@ class Across:
         levels: Those that its proof is about, or that run.
         by: How it was proved, in words.
         around: What may befall the levels there.
-        run: A run that breaks it, tick by tick, in the surroundings `broken_in`.
+        late: How many ticks late the system says that buffers may be.
+        run: A run that breaks it, tick by tick, in the surroundings `broken_in`; `run_late`, for each tick how late buffers are seen in it.
         looked: No run of so many ticks breaks it, where none is shown.
         vacuous: Whether it is proved, too, that nothing ever asks for its response.
         assumed: The assumptions across levels that it may rest on.
@@ -90,7 +94,9 @@ class Across:
     levels: tuple[str, ...] = ()
     by: str = ""
     around: Surroundings = Surroundings()
+    late: int = 0
     run: Ticks = field(default=(), repr=False)
+    run_late: tuple[Mapping[str, int], ...] = ()
     broken_in: Surroundings | None = None
     looked: int = 0
     vacuous: bool = False
@@ -108,7 +114,17 @@ class Across:
             () if self.around.refuses else (said for name in self.levels for said in admitted(systems[name]))
         )
         assumed = (f"assumption `{name}` across levels{DECLARED}" for name in self.assumed)
-        return (*assumed, *refused, *(() if self.around.restarts else (NO_RESTART,)))
+        return (
+            *assumed,
+            *refused,
+            *(() if self.around.restarts else (NO_RESTART,)),
+            *((NEVER_LATE,) if self.kinder_timing else ()),
+        )
+
+    @property
+    def kinder_timing(self) -> bool:
+        """Whether it is proved only of buffers that are never late, where the system says that they may be."""
+        return self.late > 0 and self.timing is Timing.SCHEDULED
 
     def closed(self, systems: Mapping[str, TransitionSystem], claims: Mapping[Need, Closed]) -> Closed:
         """Return its verdict with all that it rests on, as claims about levels have it."""
@@ -163,28 +179,63 @@ class Question:
         ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
         assumed = tuple(one.name for one in ts.program.environment)
         stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
-        found = Across(self.stated, levels=self.every, assumed=assumed, stuck=stuck)
-        left = list[Surroundings]()
+        found = Across(
+            self.stated, levels=self.every, late=self.system.late_ticks, assumed=assumed, stuck=stuck
+        )
+        left = list[tuple[Surroundings, Timing]]()
         for around in self._surroundings():
-            run, known = self._run(around, SHORT)
-            found = replace(found, looked=max(found.looked, known)) if around == Surroundings() else found
-            if run:
-                if len(run) <= len(found.run or run):  # of those as short the one in the kindest surroundings
-                    found = replace(found, run=run, broken_in=around)
-                continue
-            left.append(around)
+            found, broken = self._with_short_runs(found, around)
+            left += [(around, timing) for timing in self._timings if timing not in broken]
             for timing, names in self._parts():
-                if self._proved(timing, names, around) is not None:
-                    return self._as_proved(found, timing, names, around, "")
-        for around in dict.fromkeys((*left[:1], *left[-1:])):  # each may take long
-            by = self._proved(Timing.SCHEDULED, self._named(), around, exact=True)
-            if by is not None:
-                return self._as_proved(found, Timing.SCHEDULED, self._named(), around, by)
-            if not found.run:
-                run, known = self._run(around, LONG)
-                found = replace(found, run=run, broken_in=around if run else None)
-                found = replace(found, looked=max(found.looked, known)) if around == Surroundings() else found
+                if timing not in broken and self._proved(timing, names, around) is not None:
+                    return self._as_proved(self._kindest(found), timing, names, around, "")
+        return self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
+
+    def _with_short_runs(self, found: Across, around: Surroundings) -> tuple[Across, frozenset[Timing]]:
+        """Look for short runs that break it; return the timings under which some run does.
+
+        Of runs that are as short the one is kept that has the kindest surroundings, and no late buffers.
+        """
+        broken, known = set[Timing](), SHORT
+        for timing in reversed(self._timings):
+            run, looked_at = self._run(around, SHORT, timing)
+            known = min(known, looked_at)
+            if not run.ticks:
+                continue
+            broken |= {timing, self._timings[0], Timing.ANY}
+            first, kinder = not found.run, timing is Timing.SCHEDULED or not any(found.run_late)
+            if first or len(run.ticks) < len(found.run) or (len(run.ticks) == len(found.run) and kinder):
+                found = replace(found, run=run.ticks, run_late=run.late, broken_in=around)
+        if around == EVERY[0]:
+            found = replace(found, looked=max(found.looked, known))
+        return found, frozenset(broken)
+
+    def _kindest(self, found: Across) -> Across:
+        """Return it with a run as long as its own in the kindest surroundings that has one, of late buffers."""
+        for around in reversed(tuple(self._surroundings())) if any(found.run_late) else ():
+            run, _ = self._run(around, len(found.run), self._timings[0])
+            if run.ticks:
+                return replace(found, run=run.ticks, run_late=run.late, broken_in=around)
         return found
+
+    def _with_effort(self, found: Across, left: Iterable[tuple[Surroundings, Timing]]) -> Across:
+        """Prove it by exact engines, or look for longer runs: each may take long."""
+        for around, timing in left:
+            by = self._proved(timing, self._named(), around, exact=True)
+            if by is not None:
+                return self._as_proved(found, timing, self._named(), around, by)
+            if not found.run:
+                run, known = self._run(around, LONG, timing)
+                if run.ticks:
+                    found = replace(found, run=run.ticks, run_late=run.late, broken_in=around)
+                if (around, timing) == (EVERY[0], self._timings[0]):
+                    found = replace(found, looked=max(found.looked, known))
+        return found
+
+    @property
+    def _timings(self) -> tuple[Timing, ...]:
+        """The timings under which runs of all levels are told, the harder first."""
+        return (Timing.LATE, Timing.SCHEDULED) if self.system.late_ticks else (Timing.SCHEDULED,)
 
     def _surroundings(self) -> Iterator[Surroundings]:
         """Yield what may befall the levels, the hardest first."""
@@ -218,12 +269,13 @@ class Question:
     def _parts(self) -> Iterator[tuple[Timing, tuple[str, ...]]]:
         named = self._named()
         yield Timing.ANY, named
-        known: tuple[str, ...] = ()
-        for steps in range(len(self.systems) + 1):
-            names = tuple(self._reached_from(named, steps))
-            if names != known:
-                yield Timing.SCHEDULED, names
-            known = names
+        for timing in self._timings:
+            known: tuple[str, ...] = ()
+            for steps in range(len(self.systems) + 1):
+                names = tuple(self._reached_from(named, steps))
+                if names != known:
+                    yield timing, names
+                known = names
 
     def _named(self) -> tuple[str, ...]:
         """List the levels whose variables it reads, also those of a party outside, by who is at the other end."""
@@ -277,15 +329,15 @@ class Question:
 
     # --- runs ---
 
-    def _run(self, around: Surroundings, most: int) -> tuple[Ticks, int]:
+    def _run(self, around: Surroundings, most: int, timing: Timing) -> tuple[PlayedRun, int]:
         """Look for the shortest run of all levels that breaks it, of so many ticks; return it, and how long no run is that does."""
-        ts = self._together(self.every, Timing.SCHEDULED, around)
+        ts = self._together(self.every, timing, around)
         step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
         made = circuit(ts, firsts, step, obligations(ts, step))
         found = looked(made, most)
         for run in found.runs.values():
-            return played(ts, made, run, self.stated) or (), len(run.given) - 1
-        return (), found.cycles
+            return plainest(ts, made, run, self.stated) or PlayedRun(), len(run.given) - 1
+        return PlayedRun(), found.cycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -384,7 +436,7 @@ def _clauses(
         own = [places[of_member(one, lemma.level).name] for one in lemma.predicates]
         for place, clause in enumerate(lemma.clauses):
             placed = tuple(sorted((own[at], value) for at, value in clause))
-            if ts.timing is Timing.SCHEDULED or _holds(chosen, placed, start):
+            if ts.timing is not Timing.ANY or _holds(chosen, placed, start):
                 yield placed, (lemma.level, place)
 
 

@@ -20,7 +20,7 @@ from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
 from rcsc.compose.together.needed import core_across
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NO_RESTART, Across, Question, Surroundings
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question, Surroundings
 from rcsc.compose.together.repeated import finding_of, repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
@@ -31,7 +31,17 @@ from rcsc.lang.project import Loaded
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
 _FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
-_TIMINGS = {Timing.ANY: "under any timing", Timing.SCHEDULED: "as scheduled"}
+
+
+def timing_of(found: Across) -> str:
+    """Return under which timing something is proved, in words."""
+    match found.timing:
+        case Timing.ANY:
+            return "under any timing"
+        case Timing.LATE:
+            return f"with buffers at most {counted(found.late, 'tick')} late"
+        case Timing.SCHEDULED:
+            return "as scheduled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +93,19 @@ def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found:
     levels = ", ".join(f"`{name}`" for name in found.levels)
     if not found.proved:
         if found.refuted:
-            return f"refuted in tick {len(found.run)}, {_TIMINGS[found.timing]}, by a run of {levels}"
+            how = "with late buffers" if any(found.run_late) else "as scheduled"
+            return f"refuted in tick {len(found.run)}, {how}, by a run of {levels}"
         if found.stuck:
             return "not proved: what is assumed across levels was not shown to be kept for ever"
         return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
     closed = found.closed(systems, whole.closed)
-    where = f"{_TIMINGS[found.timing]}, of {levels}{f', {found.by}' if found.by else ''}"
+    where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
     if closed.lacks:
         return f"rests on {named(whole, '', closed.lacks)}; given that, proved {where}"
-    trusts = [*declared(closed.trusts), *(trust for trust in closed.trusts if trust == NO_RESTART)]
+    trusts = [
+        *declared(closed.trusts),
+        *(trust for trust in closed.trusts if trust in {NO_RESTART, NEVER_LATE}),
+    ]
     return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts)}"
 
 
@@ -108,7 +122,10 @@ def status(
     """Return the exit status: 1 where one is not proved; if strict, where it rests on what is not, trusts more, or is vacuous."""
     every = [found for found, _ in given.every]
     rests = strict and any(
-        found.vacuous or found.around != Surroundings() or found.closed(systems, whole.closed).lacks
+        found.vacuous
+        or found.around != Surroundings()
+        or found.kinder_timing
+        or found.closed(systems, whole.closed).lacks
         for found in every
     )
     return 1 if rests or not all(found.proved for found in every) else 0
@@ -139,7 +156,19 @@ def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
         else:
             say_error(Code.NOT_COMPOSED, f"requirement `{found.stated.name}` across levels: refuted")
         attach("note", f"it says: {found.stated.text}")
+        for line in _befalls(found):
+            attach("note", line)
         say_run(systems, explanation)
+
+
+def _befalls(found: Across) -> Iterator[str]:
+    """Yield a note for each tick of a run in which levels begin anew, or see buffers late."""
+    late = dict(enumerate(found.run_late, 1))
+    for tick, ran in enumerate(found.run, 1):
+        anew = [f"`{name}` begins anew" for name, step in ran.items() if step.anew]
+        ends = [f"`{end}` is seen {counted(ticks, 'tick')} late" for end, ticks in late.get(tick, {}).items()]
+        if anew or ends:
+            yield f"tick {tick}: {', '.join((*anew, *ends))}"
 
 
 def shows(systems: Mapping[str, TransitionSystem], settings: TraceSettings, name: str) -> bool | None:
@@ -217,6 +246,8 @@ def _one(
         "trusts": list(closed.trusts),
         "vacuous": found.vacuous,
         "looked": found.looked,
+        "late_ticks": found.late,
+        "seen_late": [dict(late) for late in found.run_late],
         "time_line": [] if finding is None else [asdict(row) for row in rows(systems, finding)],
         "beside": [] if explanation is None else list(explanation.beside),
         "log": "" if explanation is None or explanation.log is None else str(explanation.log),
