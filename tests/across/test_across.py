@@ -359,6 +359,18 @@ def _faults(found: Across, system: Description) -> list[BufferFault]:
     return faults
 
 
+def test_where_nothing_has_arrived_a_reader_has_what_it_begins_with(tmp_path: Path) -> None:
+    left = _HAND.replace("NAME", "left").replace("PERIOD", "10").replace("safe false", "safe true")
+    files = {"left.rcs": left.replace("|| false |", "|| true  |")}
+    (tmp_path / "new").mkdir()
+    requirement = "requirement arrives : whenever left.runs for 1 cycles, at once boss.left_runs\n"
+    assert _answers(_written(tmp_path, requirement, files=files))["arrives"].proved
+    _late(tmp_path / "new", requirement, 1)
+    (tmp_path / "new" / "left.rcs").write_text(files["left.rcs"])
+    found = _answers(tmp_path / "new" / "system.toml")["arrives"]
+    assert (found.timing, len(found.run), found.run_late[1]) == (Timing.SCHEDULED, 2, {"boss.left_runs": 1})
+
+
 def test_prove_says_how_late_buffers_are_and_strict_counts_what_needs_that_none_is(
     tmp_path: Path, rcsc: Rcsc
 ) -> None:
