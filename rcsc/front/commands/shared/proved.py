@@ -146,6 +146,7 @@ class Summary:
         claims: How many there are, agreements between levels counted; `proved`, how many of them are, and `open`, how many are not.
         trusting: How many of those proved trust that inputs are not refused, and the same in words.
         lacks: What else is not shown, kind by kind. This, and what trusts, ends with status 1 under `--strict` alone.
+        across: How many requirements across levels there are; `across_open`, how many of them are not proved.
     """
 
     claims: int
@@ -154,19 +155,25 @@ class Summary:
     trusting: int
     trusted: str
     lacks: tuple[str, ...]
+    across: int = 0
+    across_open: int = 0
 
     def status(self, *, strict: bool) -> int:
         """Return the exit status."""
-        return 1 if self.open or (strict and (self.lacks or self.trusting)) else 0
+        return 1 if self.open or self.across_open or (strict and (self.lacks or self.trusting)) else 0
 
     def line(self, *, strict: bool) -> str:
         """Return the verdict, with its colour."""
         many = counted(self.proved, "claim")
+        if self.across:
+            many = f"{counted(self.across, 'requirement')} across levels, {many}"
         if self.trusting:
             many += f", {self.trusting} of them trusting that {self.trusted}"
         rest = ", ".join(self.lacks)
-        if self.open:
-            text = f"not proved: {self.open} of {counted(self.claims, 'claim')}"
+        if self.open or self.across_open:
+            across = f"{self.across_open} of {counted(self.across, 'requirement')} across levels"
+            claims = f"{self.open} of {counted(self.claims, 'claim')}"
+            text = f"not proved: {', '.join([across] * bool(self.across_open) + [claims] * bool(self.open))}"
             return click.style(text, fg="red", bold=True) + (f"; also {rest}" if rest else "")
         status = f": status {'1' if strict else '0, and 1 with --strict'}" if rest or self.trusting else ""
         if not rest:
@@ -182,8 +189,13 @@ def _trusted(whole: SystemProof) -> str:
     return f"inputs are not refused{' or out of range' if any(clamped) else ''}"
 
 
-def summary(whole: SystemProof) -> Summary:
-    """Count the proved and the unproved claims of a system."""
+def summary(whole: SystemProof, across: tuple[int, int, tuple[str, ...]] = (0, 0, ())) -> Summary:
+    """Count the proved and the unproved claims of a system.
+
+    Args:
+        whole: Its proof.
+        across: How many requirements across levels there are, how many of them are not proved, and what else is not shown of them.
+    """
     claims = [(level.level, obligation.key) for level in whole.levels for obligation, _ in level.verdicts]
     still_open = sum(len(level.open) for level in whole.levels)
     not_agreed = sum(not agreement.holds for agreement in whole.agreements)
@@ -199,7 +211,8 @@ def summary(whole: SystemProof) -> Summary:
         still_open + not_agreed,
         trusting_,
         _trusted(whole),
-        tuple(_lacking(whole)),
+        (*across[2], *_lacking(whole)),
+        *across[:2],
     )
 
 

@@ -116,19 +116,23 @@ def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given:
         yield f"  {found.stated.name:24} {standing(systems, whole, found)}"
 
 
-def status(
-    whole: SystemProof, systems: Mapping[str, TransitionSystem], given: Answers, *, strict: bool
-) -> int:
-    """Return the exit status: 1 where one is not proved; if strict, where it rests on what is not, trusts more, or is vacuous."""
-    every = [found for found, _ in given.every]
-    rests = strict and any(
-        found.vacuous
-        or found.around != Surroundings()
-        or found.kinder_timing
-        or found.closed(systems, whole.closed).lacks
-        for found in every
-    )
-    return 1 if rests or not all(found.proved for found in every) else 0
+def counts(
+    systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers | None
+) -> tuple[int, int, tuple[str, ...]]:
+    """Count the requirements, those that are not proved, and of the others kind by kind what is not shown."""
+    every = [] if given is None else [found for found, _ in given.every]
+    proved = [found for found in every if found.proved]
+    lacks = {
+        "proved of kinder surroundings only": sum(
+            found.around != Surroundings() or found.kinder_timing for found in proved
+        ),
+        "resting on unproved claims": sum(
+            bool(found.closed(systems, whole.closed).lacks) for found in proved
+        ),
+        "that never asks": sum(found.vacuous for found in proved),
+    }
+    told = (f"{counted(many, 'requirement')} across levels {what}" for what, many in lacks.items() if many)
+    return len(every), len(every) - len(proved), tuple(told)
 
 
 def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:

@@ -154,9 +154,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     if refused or any(explanation.bug for explanation in explanations) or across.beside(given):
         return 3
     status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
-    status = max(status, summary(proof).status(strict=asked.strict))
-    if given is not None:
-        status = max(status, across.status(proof, systems, given, strict=asked.strict))
+    counts = across.counts(systems, proof, given)
+    status = max(status, summary(proof, counts).status(strict=asked.strict))
     quiet = not explanations and not asked.coverage and (given is None or not given.told)
     if cache is not None and not status and quiet:
         keep_lines(
@@ -273,14 +272,11 @@ def _lines(
 ) -> Iterator[str]:
     """Yield the lines to print of a proof; findings and coverage are part of it as JSON, and else printed by themselves."""
     if asked.as_json:
-        of_all = _as_json(proof, systems, sources, more.findings, more.coverages)
-        if more.given is not None:
-            of_all["requirements"] = across.as_json(systems, proof, more.given)
-        yield json.dumps(of_all, indent=2)
+        yield json.dumps(_as_json(proof, systems, sources, more), indent=2)
         return
     if more.given is not None:
         yield from across.lines_of(systems, proof, more.given)
-    yield summary(proof).line(strict=asked.strict)
+    yield summary(proof, across.counts(systems, proof, more.given)).line(strict=asked.strict)
     for level_proof in proof.levels:
         yield from _of_level(systems[level_proof.level], proof, level_proof)
     if asked.invariants:
@@ -506,14 +502,16 @@ def _as_json(
     proof: SystemProof,
     systems: dict[str, TransitionSystem],
     sources: Sources,
-    findings: Sequence[dict[str, Any]],
-    coverages: Mapping[str, Coverage],
+    more: "_More",
 ) -> dict[str, Any]:
+    counts = across.counts(systems, proof, more.given)
+    _, open_, lacks = counts
+    stated = {} if more.given is None else {"requirements": across.as_json(systems, proof, more.given)}
     return {
-        "proved": proof.proved,
-        "whole": proof.whole,
-        "counts": asdict(summary(proof)),
-        "findings": list(findings),
+        "proved": proof.proved and not open_,
+        "whole": proof.whole and not open_ and not lacks,
+        "counts": asdict(summary(proof, counts)),
+        "findings": list(more.findings),
         "notices": [diagnostic_to_json(notice, sources) for notice in notices(systems, proof)],
         "levels": [
             {
@@ -534,7 +532,7 @@ def _as_json(
                 ],
                 "clauses": len(level.clauses),
                 **as_json(proof, level),
-                **_coverage(coverages.get(level.level), sources),
+                **_coverage(more.coverages.get(level.level), sources),
             }
             for level in proof.levels
         ],
@@ -548,4 +546,5 @@ def _as_json(
             }
             for agreement in proof.agreements
         ],
+        **stated,
     }
