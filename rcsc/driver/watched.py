@@ -1,10 +1,11 @@
 """What was proved of a system, for whoever plays episodes of it: the claims that `rcsc prove` calls proved, as values.
 
 In: a system's description and the cache. Out: `Claims`. The proof is the kept one where the levels were proved before, else it is
-made now with the effort that `rcsc prove` takes, and kept.
+made now with the effort that `rcsc prove` takes, and kept. So are answers to requirements across levels.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from rcsc.base.diagnostics.coded import CodedError
@@ -12,6 +13,7 @@ from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import (
     AGAIN,
     CONTRACT,
+    DECLARED,
     ENDING,
     GIVEN,
     RESTING,
@@ -30,8 +32,21 @@ from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
-from rcsc.run.description import description
-from rcsc.run.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted, WatchedNeighbour
+from rcsc.compose.together.kept import answered
+from rcsc.compose.together.product import Timing
+from rcsc.compose.together.proof import NO_RESTART, Question
+from rcsc.compose.together.words import stated_across
+from rcsc.run.description import Description, description
+from rcsc.run.episodes.proved.claims import (
+    ASSUMED,
+    RESTARTS,
+    AcrossClaim,
+    Claim,
+    Claims,
+    ProvedLevel,
+    Trusted,
+    WatchedNeighbour,
+)
 
 _TOGETHER = frozenset({RUNS, ENDING, RESTING})
 """Claims that are all of several others, which are watched one by one."""
@@ -53,7 +68,34 @@ def claims_of(path: Path, cache: Cache | None, jobs: int = 1) -> Claims:
     except CodedError as error:
         return Claims(why=str(error))
     proof = prove_transition_systems(systems, None, jobs, tuple(systems), None, cache)
-    return proved_claims(path, systems, proof)
+    claims = proved_claims(path, systems, proof)
+    return replace(claims, across=tuple(_across(description(path), systems, proof, cache)))
+
+
+def _across(
+    system: Description, systems: dict[str, TransitionSystem], proof: SystemProof, cache: Cache | None
+) -> Iterator[AcrossClaim]:
+    """Yield what is proved across levels, with all that it rests on."""
+    stated = stated_across(system, {name: ts.program for name, ts in systems.items()})
+    proofs = {level.level: level for level in proof.levels}
+    if stated is None:
+        return
+    for one in stated[0].properties:
+        found = answered(Question(systems, system, stated[0], one, proofs), cache)
+        closed = found.closed(systems, proof.closed)
+        if not closed.proved:
+            continue
+        across = {f"assumption `{name}` across levels{DECLARED}": name for name in found.assumed}
+        trusts = tuple(
+            Trusted(RESTARTS, "", "", words)
+            if words == NO_RESTART
+            else Trusted(ASSUMED, "", across[words], words)
+            if words in across
+            else Trusted(*trust_of(words), words)
+            for words in closed.trusts
+        )
+        scheduled = found.timing is Timing.SCHEDULED
+        yield AcrossClaim(one.name, scheduled, "as scheduled" if scheduled else "under any timing", trusts)
 
 
 def proved_claims(path: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> Claims:

@@ -13,9 +13,9 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
 from rcsc.compose.exact.circuit import Circuit
 from rcsc.compose.exact.explicit import Run
 from rcsc.compose.together.product import Tick, Together
-from rcsc.lang.interpret import UNDEFINED, Fault, holds, initial
+from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Property, Value, earlier, value_of_key
+from rcsc.lang.model import Property, Value, value_of_key
 from rcsc.lang.over_time.run import Watch
 from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic.values import Node
@@ -181,7 +181,7 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
         run: Of it.
         stated: The requirement that it breaks.
     """
-    playing, watch = Playing(ts), Watch(stated) if stated.monitor is not None else None
+    playing, watch = Playing(ts), Watch(stated)
     environment = [Watch(one) for one in ts.program.environment]
     ticks, ages, kept = list[Mapping[str, CycleRun]](), list[Mapping[str, int]](), True
     for number, given in enumerate(run.given):
@@ -202,7 +202,7 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
             return None
         if not all(one.keeps(before, after) for one in environment):
             return None
-        kept = _keeps(stated, watch, before, after)
+        kept = watch.keeps(before, after)
     return None if kept else PlayedRun(tuple(ticks), _least_late(playing, ticks, ages))
 
 
@@ -250,15 +250,6 @@ def _least_late(
             if late := playing.newest(end, at) - last:
                 shown[at][end] = late
     return tuple(shown)
-
-
-def _keeps(stated: Property, watch: Watch | None, before: State, after: State) -> bool:
-    if watch is not None:
-        return watch.keeps(before, after)
-    try:
-        return holds(stated.condition, {**after, **{str(earlier(leaf)): v for leaf, v in before.items()}})
-    except UNDEFINED:
-        return False
 
 
 def _asked(ts: Together, tick: Tick, name: str, given: Mapping[str, int], number: int) -> Asked:

@@ -1,10 +1,10 @@
-"""What the names of a file of requirements across levels mean: the variables of all levels, and of the parties outside that buffers name.
+"""What the names of a file of requirements across levels mean: of a system that is proved, and of one whose files are checked.
 
-In: a system's description and the programs of its levels. Out: `Parties` for `resolve_across`, and the program of the file.
+In: a system's description and the programs of its levels. Out: the program of the file (`run.log.across` reads it, for runs, too).
 """
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -13,9 +13,11 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic
 from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, content, toml_of
 from rcsc.compose.proof.system import NoProgramError, loaded_program
 from rcsc.lang.model import Program
-from rcsc.lang.project import Loaded, load, systems_above
-from rcsc.lang.resolve.across import Named, Parties, named, part_of, resolve_across
+from rcsc.lang.project import Loaded, systems_above
+from rcsc.lang.resolve.across import resolve_across
 from rcsc.run.description import BadDescription, Description, LevelSpec, description
+from rcsc.run.log import across
+from rcsc.run.log.across import parties
 
 Read: TypeAlias = Callable[[Path, Description, LevelSpec], tuple[Program, Loaded]]
 
@@ -69,15 +71,10 @@ def stated_across(system: Description, programs: Mapping[str, Program]) -> tuple
     Raises:
         NoProgramError: The file is missing, or not in order.
     """
-    if system.requirements is None:
-        return None
-    loaded = load([os.path.relpath(system.requirements)])
-    program = LevelsRead(system, programs, {}).means(loaded.roots[0], loaded) if loaded.roots else ()
-    if isinstance(program, Program):
-        return program, loaded
-    raise NoProgramError(
-        f"the file of requirements across levels is not in order: see `rcsc check {os.path.relpath(system.requirements)}`"
-    )
+    try:
+        return across.stated_across(system, programs)
+    except BadDescription as error:
+        raise NoProgramError(str(error)) from error
 
 
 def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -93,26 +90,3 @@ def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> t
     except (BadDescription, NoProgramError):
         return ()
     return () if isinstance(found, Program) else found
-
-
-def parties(system: Description, programs: Mapping[str, Program]) -> Parties:
-    """Return what each level has, and each party outside: what it gives to levels, and what it takes of them."""
-    every: dict[str, dict[str, Named]] = {
-        level: {declared.name: named(program, declared) for declared in program.declared}
-        for level, program in programs.items()
-    }
-    for party, one in _outside(system, programs):
-        every.setdefault(party, {}).setdefault(one.name, one)
-    return {party: tuple(variables.values()) for party, variables in every.items()}
-
-
-def _outside(system: Description, programs: Mapping[str, Program]) -> Iterator[tuple[str, Named]]:
-    """Yield each variable of a party outside, of the type that the level at the other end of its buffer has."""
-    for wire in system.wires:
-        for end, other, given in ((wire.source, wire.target, True), (wire.target, wire.source, False)):
-            (party, _, name), (level, _, variable) = end.partition("."), other.partition(".")
-            if party in programs or level not in programs or "." in name:
-                continue
-            declared = part_of(programs[level], variable)
-            if declared is not None:
-                yield party, named(programs[level], declared, name, given=given)

@@ -21,7 +21,7 @@ from rcsc.base.diagnostics.report import TableReport, resting
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.base.host.memory import uncollected
 from rcsc.compose.proof.system import NoProgramError
-from rcsc.compose.together.words import LevelsRead, levels_read, parties, system_naming
+from rcsc.compose.together.words import LevelsRead, levels_read, system_naming
 from rcsc.desk.editor.grid import grids
 from rcsc.desk.editor.memo import Memo, OutdatedError
 from rcsc.desk.editor.names.find import Names, Party
@@ -50,6 +50,7 @@ from rcsc.proof.symbolic.remembered import remembering
 from rcsc.proof.table.mending import COUNTED, key, mended, serious
 from rcsc.proof.table.program import prove_program
 from rcsc.run.description import BadDescription, Description, LevelSpec
+from rcsc.run.log.across import parties
 
 if TYPE_CHECKING:
     from rcsc.lang.syntax import tree

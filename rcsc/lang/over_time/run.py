@@ -1,6 +1,7 @@
 """A monitor over a run, a cycle at a time.
 
 In: a monitor, its states, and the leaves before and after a cycle. Out: its states after it, and whether the cycle keeps the requirement.
+A property has no monitor: each cycle keeps it or not, whatever came before.
 """
 
 from collections.abc import Iterable, Mapping
@@ -52,7 +53,7 @@ def _run(statements: Iterable[Statement], now: dict[str, Value]) -> None:
 
 @dataclass(slots=True)
 class Watch:
-    """A requirement that is watched as a run goes on.
+    """A requirement, or a property, that is watched as a run goes on.
 
     Attributes:
         state: The states of its monitor.
@@ -66,11 +67,19 @@ class Watch:
 
     def begin(self) -> None:
         """Begin anew, before a first cycle."""
-        assert self.stated.monitor is not None
-        self.state = begun(self.stated.monitor)
+        self.state = {} if self.stated.monitor is None else begun(self.stated.monitor)
 
     def keeps(self, before: Snapshot, after: Snapshot) -> bool:
         """Take a cycle, of which these are the leaves before and after; return whether it keeps the requirement."""
-        assert self.stated.monitor is not None
+        if self.stated.monitor is None:
+            return _holds(self.stated.condition, before, after)
         self.state, kept = stepped(self.stated.monitor, self.stated.condition, self.state, before, after)
         return kept
+
+
+def _holds(condition: Expr, before: Snapshot, after: Snapshot) -> bool:
+    """Return whether a condition on a cycle and the one before it is defined and true."""
+    try:
+        return holds(condition, {**after, **{str(earlier(name)): value for name, value in before.items()}})
+    except UNDEFINED:
+        return False

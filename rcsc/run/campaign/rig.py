@@ -199,8 +199,12 @@ def digest(rig: Rig[Any]) -> str:
 
 
 def programs(described: Description, system: Path) -> list[Path]:
-    """Return the sources of the levels, with all that they use: properties are told by them, and leave no trace in executors."""
-    roots = (place for level in described.levels for place in places(system, level.source) if place.is_file())
+    """Return the sources of the levels, with all that they use: properties are told by them, and leave no trace in executors.
+
+    And the file of what is required across levels.
+    """
+    roots = [place for level in described.levels for place in places(system, level.source) if place.is_file()]
+    roots += [described.requirements] if described.requirements is not None else []
     return sorted(map(Path, load([str(root) for root in roots]).files))
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from rcsc.run.campaign.journal import EpisodeRecord
 from rcsc.run.campaign.rig import LineName
-from rcsc.run.episodes.proved.claims import Claim, Claims, Unwatched
+from rcsc.run.episodes.proved.claims import AcrossClaim, Claim, Claims, Unwatched
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import Stand
 
@@ -48,6 +48,7 @@ _KINDS = {
     "FAILED_STAYS": "failed stays",
 }
 """What a kind of claim is called where its claims are counted."""
+_AS_SCHEDULED = "what is proved as scheduled is not asked for once a buffer between levels was late, lost a value or repeated one"
 _WIDEST_SHOWN = 12
 """Lines of a table that are named where they were never reached."""
 
@@ -154,12 +155,14 @@ class Watched:
     Attributes:
         watched: Claims that are, by level; `unwatched`, those that cannot be, each with why, `proofs` which proofs they are from.
         why: Why there are none; empty where there are.
+        across: Those across levels.
     """
 
     watched: Mapping[str, tuple[Claim, ...]]
     unwatched: tuple[Unwatched, ...]
     proofs: Mapping[str, str]
     why: str = ""
+    across: tuple[AcrossClaim, ...] = ()
 
 
 def watched(claims: Claims, its: Stand) -> Watched:
@@ -172,19 +175,24 @@ def watched(claims: Claims, its: Stand) -> Watched:
         for level in claims.levels
     }
     proofs = {level.name: level.proof for level in claims.levels}
-    return Watched(by_level, tuple(holds.unwatched), proofs, claims.why)
+    return Watched(by_level, tuple(holds.unwatched), proofs, claims.why, tuple(holds.together.values()))
 
 
 def watched_text(of: Watched) -> list[str]:
     """Say which claims were watched, from which proof, and which could not be."""
     if of.why:
         return [f"no claim of a proof is watched: {of.why}"]
-    many = sum(map(len, of.watched.values()))
+    many = sum(map(len, of.watched.values())) + len(of.across)
     lines = [f"{many} of {many + len(of.unwatched)} claims that `rcsc prove` calls proved are watched"]
     for level, claims in of.watched.items():
         kinds = Counter(_KINDS.get(claim.kind, claim.kind) for claim in claims)
         named = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
         lines.append(f"  level {level}, proof {of.proofs[level][:_DIGITS]}: {named or 'none'}")
+    for words in dict.fromkeys(claim.words for claim in of.across):
+        names = ", ".join(f"`{claim.name}`" for claim in of.across if claim.words == words)
+        lines.append(f"  across levels, {words}: {names}")
+    if any(claim.scheduled for claim in of.across):
+        lines.append(f"  {_AS_SCHEDULED}")
     lines += [f"  not watched: {level_claim(claim)}: {why}" for claim, why in of.unwatched]
     return lines
 
@@ -203,6 +211,7 @@ def watched_json(of: Watched) -> dict[str, Any]:
             {"level": claim.level, "claim": claim.words, "why": why} for claim, why in of.unwatched
         ],
         "why_none": of.why,
+        "across": [asdict(claim) for claim in of.across],
     }
 
 

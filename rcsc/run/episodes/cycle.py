@@ -5,12 +5,15 @@ In: a running system after a tick. Out: a `Cycle`, one for the whole run, which 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from rcsc.run.episodes.operator import EpisodeOperator
 from rcsc.run.levels import RunningLevel
 from rcsc.run.plant.bind import BoundPlant
 from rcsc.run.signature import Values
+
+if TYPE_CHECKING:
+    from rcsc.lang.model import Property as Stated  # who plays other episodes knows no language
 
 MOST_MESSAGE = 300
 
@@ -25,6 +28,8 @@ class Broken(NamedTuple):
         leaves: That it is about, where only readings of these explain it; empty where any level that was misled does.
         proved: Whether it was proved: then only older values that came again explain it.
         outside: Whether it was assumed over time of what comes from outside: no level is at fault, then or later.
+        across: Whether it is about several levels: what misled any of them explains it, and of an assumption readings of `leaves`.
+        because: The fault that explains it, where that is known already.
     """
 
     property: str
@@ -33,6 +38,8 @@ class Broken(NamedTuple):
     leaves: tuple[str, ...] = ()
     proved: bool = False
     outside: bool = False
+    across: bool = False
+    because: str = ""
 
 
 @dataclass(slots=True)
@@ -48,6 +55,8 @@ class Cycle:
         restarted: Levels that started anew before this cycle.
         refused: By level, leaves that now hold what the level must refuse.
         faulty: Whether any fault is at work.
+        broken: What is stated across levels and this cycle breaks, with the values that show it.
+        unscheduled: The fault by which a buffer between levels did not come as scheduled, in this cycle or before; empty for none.
     """
 
     levels: Mapping[str, RunningLevel]
@@ -61,6 +70,8 @@ class Cycle:
     restarted: frozenset[str] = frozenset()
     refused: Mapping[str, frozenset[str]] = field(default_factory=dict)
     faulty: bool = False
+    broken: "tuple[tuple[Stated, str], ...]" = ()
+    unscheduled: str = ""
 
 
 class Property(Protocol):

@@ -209,7 +209,7 @@ class Episode(SavedEpisode):
                 _order_told(order, first=all(order.level != before.level for before in self.orders[:at]))
                 for at, order in enumerate(self.orders)
             ),
-            *(f"{window_told(harm)}: buffer `{harm.buffer}` {_HARMS[harm.kind]}" for harm in self.harms),
+            *map(harm_told, self.harms),
             *(
                 f"{window_told(reading)}: `{reading.field}` = {_cell(reading.value)}"
                 for reading in self.readings
@@ -270,6 +270,11 @@ _HARMS = {
     "doubled": "gives each value twice",
     "stale": "gives older values again",
 }
+
+
+def harm_told(harm: BufferFault) -> str:
+    """Say what happens to a buffer, and when."""
+    return f"{window_told(harm)}: buffer `{harm.buffer}` {_HARMS[harm.kind]}"
 
 
 def window_told(window: BufferFault | Reading | Switch) -> str:

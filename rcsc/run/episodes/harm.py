@@ -193,6 +193,10 @@ class Explanations:
 
     def because(self, broken: Broken) -> str:
         """Return the fault that explains it; empty for none."""
+        if broken.because:
+            return broken.because
+        if broken.across:
+            return self._across(broken)
         if broken.proved:
             return self.repeated.get(broken.level, "")
         if not broken.level:
@@ -209,6 +213,12 @@ class Explanations:
                 self.misled[broken.level] = because  # it was proved of levels whose assumptions hold
                 return because
         return ""
+
+    def _across(self, broken: Broken) -> str:
+        """Return the fault that explains what is broken across levels."""
+        forged = {f"{level}.{leaf}": why for level, by in self.forged.items() for leaf, why in by.items()}
+        of_leaves = [forged[leaf] for leaf in broken.leaves if leaf in forged]
+        return next(iter((*(self.repeated if broken.proved else self.misled).values(), *of_leaves)), "")
 
 
 def follows(program: Program, leaf: str) -> set[str]:

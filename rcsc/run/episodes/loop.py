@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from rcsc.base.host.files.names import shown
 from rcsc.run.episodes.cycle import MOST_MESSAGE, Broken, Cycle
-from rcsc.run.episodes.episode import Episode, Reading
+from rcsc.run.episodes.episode import Episode, Reading, harm_told
 from rcsc.run.episodes.harm import Explanations, HarmedMemory, Held
 from rcsc.run.episodes.operator import WAITING, EpisodeOperator, operator, value_of
 from rcsc.run.episodes.outcome import EpisodeFinding, EpisodeOutcome, Excused
@@ -23,6 +23,7 @@ from rcsc.run.episodes.subordinates import subordinates
 from rcsc.run.executors import refuse_unproved
 from rcsc.run.faults import faults_of, switch
 from rcsc.run.levels import BadState, RunningLevel, StateTableError, running_level
+from rcsc.run.log.across import AcrossWatch
 from rcsc.run.orders.numbered import Latest
 from rcsc.run.orders.roles import FAILED
 from rcsc.run.orders.together import Together
@@ -196,6 +197,8 @@ class Loop:
             {level.name: level.initial for level in levels}, {level.name: level.initial for level in levels},
         )  # fmt: skip
         self.watching = properties(its, its.system.within, claims)
+        self._across = AcrossWatch.of(its.across, its.system, its.signs)
+        self._stood: dict[str, Values | None] = {}
         self._explained, self._seen = Explanations(its), _Seen()
         self._on = frozenset[str]()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
@@ -237,6 +240,8 @@ class Loop:
         """Run one tick."""
         tick = self.system.tick
         self._memory.begin(tick)
+        self._stood = {name: self._memory.latest(name) for name in self._across.buffers}
+        self.cycle.unscheduled = self.cycle.unscheduled or self._unscheduled(tick)
         self._switch(tick)
         restarted = sorted(one.level for one in self.episode.restarts if one.tick == tick)
         self.cycle.restarted = frozenset(restarted)
@@ -335,6 +340,7 @@ class Loop:
                 before = level.sign.lines_before(level.level, values)
                 self._seen.staged.update((level.name, table, line) for table, line in before)
         cycle.tick, cycle.ran = system.tick, ran
+        cycle.broken = tuple(self._across.tick({level.name: level.values for level in ran}, self._stood))
         self._explained.note({name: self._why(name) for name in self._memory.changed}, self._memory.changed)
         # all watch before any finding is made: a finding names the trusted facts that this cycle broke, too
         for broken in [broken for watcher in self.watching for broken in watcher.watch(cycle)]:
@@ -343,6 +349,16 @@ class Loop:
             cycle.left[level.name] = level.values
             if level.fault in (0, STOPPED):
                 cycle.before[level.name] = level.values
+
+    def _unscheduled(self, tick: int) -> str:
+        """Return the fault that is at work in a buffer between levels from this tick on, in words; empty for none."""
+        signs, readers = self._its.signs, self._its.system.readers()
+        for harm in self.episode.harms:
+            ends = (harm.buffer, *readers.get(harm.buffer, ()))
+            among = [end.partition(".")[0] in signs for end in ends]
+            if harm.first_tick == tick and among[0] and any(among[1:]):
+                return harm_told(harm)
+        return ""
 
     def _why(self, buffer: str) -> str:
         """Return the fault that changed a buffer, in words."""
@@ -376,7 +392,8 @@ class Loop:
         if broken.outside:
             if not because and not self._stage.outside:
                 because = "the episode gives what no plant says"
-            self._explained.misled.setdefault(broken.level, f"{name} was broken in cycle {tick}")
+            if not broken.across:
+                self._explained.misled.setdefault(broken.level, f"{name} was broken in cycle {tick}")
         if because:
             self._seen.excused.setdefault(name, Excused(name, tick, message, because))
         else:

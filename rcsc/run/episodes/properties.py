@@ -10,6 +10,7 @@ from rcsc.lang import model
 from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by, spoken_of
 from rcsc.lang.model import BEFORE, Value
+from rcsc.run.episodes.across import AcrossHolds
 from rcsc.run.episodes.cycle import Broken, Cycle, Property
 from rcsc.run.episodes.operator import Given
 from rcsc.run.episodes.proved.claims import NOTHING, Claims
@@ -384,5 +385,6 @@ def properties(stand: Stand, within: int, claims: Claims = NOTHING) -> list[Prop
         told = int(link.order_leaves[link.command].initial)
         said = echo, link.report_leaves[link.status].shown(link.report_leaves[link.status].initial)
         watching.append(AnswerStays(link, at, sign.index[link.order_leaves[0].name], told, said))
+    watching += [AcrossHolds(stand, claims)] if stand.across else []
     proved = [ProvedHolds(claims, stand)] if claims.levels else []
     return [*watching, Ends(within), PlantHolds(), *proved]

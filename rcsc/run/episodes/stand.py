@@ -11,10 +11,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from rcsc.code.testing.executors.edges import leaf_edges, outside
-from rcsc.lang.model import Admit, Program, Scalar, Value, Variable, VariableName, value_of_key
+from rcsc.lang.model import Admit, Program, Property, Scalar, Value, Variable, VariableName, value_of_key
 from rcsc.lang.restart import NUMBER, PROTOCOL, After
 from rcsc.run.description import Description, description, places
 from rcsc.run.faults import faults_of
+from rcsc.run.log.across import stated_across
 from rcsc.run.log.required import program_of
 from rcsc.run.orders.roles import Served, field_of, ordered
 from rcsc.run.orders.script import OutsideBuffer, outside_buffers
@@ -66,6 +67,7 @@ class Stand:
         outside: Those that no level fills.
         edges: By level and leaf, the values at which something may turn.
         fields: From outside, but those that the protocol fills.
+        across: Properties, requirements and assumptions across levels.
         files: All that this was read from, with the times of the files.
     """
 
@@ -79,6 +81,7 @@ class Stand:
     edges: Mapping[str, Mapping[str, tuple[Value, ...]]] = field(repr=False)
     fields: tuple[Field, ...] = field(repr=False)
     files: tuple[tuple[str, int], ...] = field(repr=False)
+    across: tuple[Property, ...] = ()
 
     @property
     def served(self) -> tuple[Served, ...]:
@@ -116,6 +119,7 @@ def _files(path: Path, generated: Path | None) -> tuple[tuple[str, int], ...]:
     """Return every file that a stand is made of, with its time: all sources, plants and models beside the description and its levels."""
     system = _described(path, path.stat().st_mtime_ns if path.is_file() else 0)
     tried = [place for spec in system.levels for place in places(path, spec.source)]
+    tried += [system.requirements] if system.requirements else []
     folders = dict.fromkeys((path.parent, *(place.parent for place in tried)))
     files = [file for folder in folders for end in SOURCES for file in sorted(folder.glob(end))]
     symbols = [generated_files(generated or system.generated, spec.program)[0] for spec in system.levels]
@@ -135,9 +139,11 @@ def _stand(path: Path, generated: Path | None, files: tuple[tuple[str, int], ...
     programs = {spec.name: program_of(path, system, spec) for spec in system.levels}
     edges = {name: _edges(program) for name, program in programs.items()}
     buffers = outside_buffers(system, signs)
+    across = stated_across(system, programs)
     return Stand(
         path, system, signs, programs, ordered(system, signs), tuple(system.readers()),
         buffers, edges, tuple(_fields(system, signs, buffers, programs, edges)), files,
+        () if across is None else across[0].stated,
     )  # fmt: skip
 
 

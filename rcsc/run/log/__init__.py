@@ -22,5 +22,6 @@ most after a kill. Needs the extra `log`.
 
 Modules, in the order the data flows: `schema` (what a log says of itself), `records` (the chain), `recorder`; `read`,
 `states` (a state in words), `ticks` (a run, tick by tick), `finding` (what a finding's log adds), `queries` (conditions,
-as people type them), `required` (requirements over time, watched), `replay`, `export` (tables and pictures).
+as people type them), `across` (requirements across levels, watched), `required` (requirements over time, watched), `replay`, `export`
+(tables and pictures).
 """

@@ -1,7 +1,7 @@
 """What is required and assumed over time, watched in a run: of a log, cycle by cycle, and of what else gives values before and after one.
 
 In: a log, or values; resolved programs. Out: the cycles that break it, with the values that they left. It is the monitor that
-`rcsc prove` proves: executors have no part in it.
+`rcsc prove` proves: executors have no part in it. What is required across levels is watched tick by tick (`across`).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,12 +15,16 @@ from rcsc.lang.model import BEFORE, Program, Property, Value
 from rcsc.lang.over_time import Watch
 from rcsc.lang.resolve import resolve
 from rcsc.run.description import BadDescription, Description, LevelSpec, places
+from rcsc.run.log.across import AcrossTrack, stated_across
 from rcsc.run.log.states import LogColumn
 from rcsc.run.signature import Signature, Values
 
 if TYPE_CHECKING:  # reading a log needs its extra; watching values does not
     from rcsc.run.log.queries import Column
     from rcsc.run.log.read import Log, LoggedLevel
+
+ACROSS = ""
+"""As the name of a level, which none has: of all levels together."""
 
 
 def program_of(path: Path, system: Description, spec: LevelSpec) -> Program:
@@ -75,7 +79,7 @@ def watch_of(stated: Property, sign: Signature) -> LevelWatch:
 
 @dataclass(frozen=True, slots=True)
 class BrokenRequirement:
-    """A cycle of a level that breaks a requirement, or an assumption; `shown`, the values that it left."""
+    """A cycle of a level, or a tick of all (`ACROSS`), that breaks a requirement, or an assumption; `shown`, the values that it left."""
 
     level: str
     name: str
@@ -84,24 +88,49 @@ class BrokenRequirement:
     shown: str
     assumed: bool = False
 
+    @property
+    def word(self) -> str:
+        """What its declaration calls it."""
+        return "assumption" if self.assumed else "requirement"
+
+    @property
+    def asked(self) -> str:
+        """Its name, as a condition on a run calls it."""
+        return f"{self.level}.{self.name}" if self.level else self.name
+
 
 def requirements(system: Path, described: Description, *, monitored: bool) -> dict[str, tuple[Property, ...]]:
     """Return the requirements and assumptions over time of each level that has some, all or those that every run watches.
+
+    Those across levels are under `ACROSS`; with all of these, properties, too.
 
     Raises:
         BadDescription: A program is not there, or not in order.
     """
     known: dict[str, tuple[Property, ...]] = {}
-    for spec in described.levels:
-        every = program_of(system, described, spec).over_time
-        known[spec.name] = tuple(one for one in every if one.monitored or not monitored)
+    programs = {spec.name: program_of(system, described, spec) for spec in described.levels}
+    for name, program in programs.items():
+        known[name] = tuple(one for one in program.over_time if one.monitored or not monitored)
+    across = stated_across(described, programs)
+    stated = () if across is None else across[0].stated
+    known[ACROSS] = tuple(one for one in stated if one.monitored or not monitored)
     return {level: stated for level, stated in known.items() if stated}
 
 
 def broken_in(log: "Log", wanted: Mapping[str, tuple[Property, ...]]) -> Iterator[BrokenRequirement]:
-    """Yield each cycle of a log that breaks one of the requirements, level by level; one that reads what the log lacks is left out."""
+    """Yield each cycle of a log that breaks one of the requirements, level by level, then those across levels.
+
+    One that reads what the log lacks is left out.
+    """
     for level in log.levels:
         yield from WatchedTrack.of(level.sign, wanted.get(level.name, ())).further(level)
+    yield from broken_across(AcrossTrack.of(log, wanted.get(ACROSS, ())), log)
+
+
+def broken_across(track: AcrossTrack, log: "Log") -> Iterator[BrokenRequirement]:
+    """Yield each tick that breaks a requirement across levels, of those that were not looked at yet."""
+    for tick, stated, shown in track.further(log):
+        yield BrokenRequirement(ACROSS, stated.name, tick, stated.text, shown, stated.assumed)
 
 
 def _is_read(stated: Property, sign: Signature) -> bool:
@@ -154,7 +183,8 @@ def kept_columns(
     def column(at: int, name: str) -> LogColumn:
         return LogColumn(name, (), "bool", "", lambda values: values[at])
 
-    columns = {f"{level}.{name}": (_KEPT, column(at, name)) for at, (level, name) in enumerate(every)}
+    names = (f"{level}.{name}" if level else name for level, name in every)
+    columns = {whole: (_KEPT, column(at, whole)) for at, whole in enumerate(names)}
     return columns, lambda tick: {_KEPT: tuple((*one, tick) not in broken for one in every)}
 
 

@@ -34,7 +34,7 @@ from rcsc.run.description import BadDescription, description
 from rcsc.run.levels import RunningLevel
 from rcsc.run.log.queries import BadCondition, Predicate, predicate
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.required import BrokenRequirement, kept_columns, requirements
+from rcsc.run.log.required import ACROSS, BrokenRequirement, kept_columns, requirements
 from rcsc.run.signature import Signature, Values, number_word
 
 MOST_MARKED = 1000
@@ -166,8 +166,7 @@ class TimeLine(Concern):
 
     def _marks(self) -> Iterator[Mark]:
         for broken in self._broken():
-            word = "assumption" if broken.assumed else "requirement"
-            text = f"{word} `{broken.level}.{broken.name}` is broken: {broken.shown}"
+            text = f"{broken.word} `{broken.asked}` is broken: {broken.shown}"
             yield Mark(broken.tick, "finding", text)
         if self._log is None:
             yield from self.live.marks
@@ -187,6 +186,8 @@ class TimeLine(Concern):
     def _required(self, log: Log, *, monitored: bool = False) -> dict[str, tuple[Property, ...]]:
         """Return what is required and assumed over time of levels, from their sources; nothing of one that ran other tables than now.
 
+        Across levels, where all of them run here with the tables of now.
+
         Nothing is proved or compiled for it: the run goes on meanwhile.
         """
         path = self.live.opening.path
@@ -195,7 +196,8 @@ class TimeLine(Concern):
             here = {level.name for level in log.levels if self._running(level) is not None}
         except (BadDescription, Refused):
             return {}
-        return {name: stated for name, stated in every.items() if name in here}
+        whole = here == {level.name for level in log.levels}
+        return {name: stated for name, stated in every.items() if name in here or (name == ACROSS and whole)}
 
     # --- values ---
 

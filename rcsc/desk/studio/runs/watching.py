@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 from rcsc.desk.studio.runs.history import History
 from rcsc.lang.model import Property
+from rcsc.run.log.across import AcrossTrack
 from rcsc.run.log.read import Log
-from rcsc.run.log.required import BrokenRequirement, WatchedTrack
+from rcsc.run.log.required import ACROSS, BrokenRequirement, WatchedTrack, broken_across
 
 
 @dataclass(slots=True)
@@ -23,7 +24,7 @@ class Watched:
 
     broken: list[BrokenRequirement] = field(default_factory=list)
     _era: int = -1
-    _tracks: list[list[WatchedTrack]] = field(default_factory=list)
+    _tracks: list[tuple[list[WatchedTrack], AcrossTrack]] = field(default_factory=list)
 
     def look(self, history: History, wanted: Callable[[Log], Mapping[str, Sequence[Property]]]) -> None:
         """Look at the cycles that came since; `wanted` gives the requirements of a log's levels, and is asked once."""
@@ -34,8 +35,9 @@ class Watched:
         for number, log in enumerate(history.logs):
             if number == len(self._tracks):
                 stated = wanted(log)
-                self._tracks.append(
-                    [WatchedTrack.of(level.sign, stated.get(level.name, ())) for level in log.levels]
-                )
-            for level, track in zip(log.levels, self._tracks[number], strict=True):
+                own = [WatchedTrack.of(level.sign, stated.get(level.name, ())) for level in log.levels]
+                self._tracks.append((own, AcrossTrack.of(log, stated.get(ACROSS, ()))))
+            own, across = self._tracks[number]
+            for level, track in zip(log.levels, own, strict=True):
                 self.broken += track.further(level)
+            self.broken += broken_across(across, log)

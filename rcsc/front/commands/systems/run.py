@@ -36,6 +36,8 @@ from rcsc.views.pages.report import Figure, ReportRow, Story, report
 from rcsc.views.pages.witness import RunWitness
 
 if TYPE_CHECKING:
+    from rcsc.lang.model import Property
+    from rcsc.run.log.required import BrokenRequirement
     from rcsc.run.plant.staged import Staged
 
 
@@ -191,6 +193,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
         Interrupted: The user, or the system, ended it.
     """
     system = description(asked.path)
+    wanted = _wanted(asked)
     signs = signatures(system)
     stage = staged(asked.order, system, signs)
     running = assemble(system, asked.kind, stage.queries, standing(stage, system, signs))
@@ -210,28 +213,51 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
             raise _interrupted(run, log) from error
     if asked.report is not None:
         _write_report(asked.report, witness, log, asked, seconds)
-    broken = _watched(asked, log)
+    broken = _watched(wanted, log)
     return _closing(witness, stage.resume, asked, seconds, log) or int(broken)
 
 
-def _watched(asked: RunOptions, log: Path) -> bool:
-    """Say the first cycle that breaks each requirement, or assumption, that every run watches; return whether there is one."""
-    from rcsc.run.log.read import read
-    from rcsc.run.log.required import BrokenRequirement, broken_in, requirements
+def _wanted(asked: RunOptions) -> dict[str, "tuple[Property, ...]"]:
+    """Return what every run watches of this system: what is wrong there is told before anything moves."""
+    from rcsc.run.log.required import requirements
 
-    wanted = requirements(asked.path, description(asked.path), monitored=True)
+    return requirements(asked.path, description(asked.path), monitored=True)
+
+
+def _watched(wanted: Mapping[str, "tuple[Property, ...]"], log: Path, *, free: bool = False) -> bool:
+    """Say the first cycle that breaks each requirement, or assumption, that every run watches; return whether there is one.
+
+    Args:
+        wanted: What is watched.
+        log: Of the run.
+        free: Whether levels ran when they liked.
+    """
+    from rcsc.run.log.read import read
+    from rcsc.run.log.required import BrokenRequirement, broken_in
+
     first: dict[tuple[str, str], BrokenRequirement] = {}
     for one in broken_in(read(log), wanted) if wanted else ():
         first.setdefault((one.level, one.name), one)
     for one in sorted(first.values(), key=lambda one: one.tick):
-        what = "requirement" if not one.assumed else "by what comes from outside, assumption"
-        message = f"level `{one.level}`, cycle {one.tick}: {what} `{one.name}` is broken: {one.shown}"
-        say_error(Code.PROPERTY_BROKEN, message)
+        say_error(Code.PROPERTY_BROKEN, _broken(one))
         attach("note", f"it says: {one.text}")
         if one.assumed:
             attach("note", "what is proved trusting it says nothing of this cycle, nor of any later one")
-        attach("help", f'rcsc replay {shlex.quote(str(log))} --find "not {one.level}.{one.name}"')
+        elif free and not one.level:
+            attach(
+                "note",
+                "each level ran when it liked: what is proved under any timing holds of this run, what is proved as scheduled need not",
+            )
+        attach("help", f'rcsc replay {shlex.quote(str(log))} --find "not {one.asked}"')
     return bool(first)
+
+
+def _broken(one: "BrokenRequirement") -> str:
+    if one.level:
+        what = one.word if not one.assumed else "by what comes from outside, assumption"
+        return f"level `{one.level}`, cycle {one.tick}: {what} `{one.name}` is broken: {one.shown}"
+    by = " by what stands outside" if one.assumed else ""
+    return f"cycle {one.tick}: {one.word} `{one.name}` across levels is broken{by}: {one.shown}"
 
 
 def _place(run: ScriptedRun, resume: StoppedRuns | None, from_row: int | None, resumes: bool) -> None:
@@ -348,6 +374,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
     from rcsc.run.log.recorder import Recorder  # noqa: F401  # of an extra: told before a process is begun
 
     system = description(asked.path)
+    wanted = _wanted(asked)
     rows, faults = _checked_apart(asked, system, from_row)
     log = _log_path(asked, system)
     with _writable(log):
@@ -358,7 +385,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
         course = Course(asked.in_step, log, asked.most, asked.path, faults, asked.order.faults)
         ends = _rows_apart(asked, system, course, (from_row or 1) - 1, folder / "results")
     _recorded_apart(asked, system, ends, log, time.perf_counter() - begun)
-    broken = _watched(asked, log)
+    broken = _watched(wanted, log, free=not asked.in_step)
     if ends and ends[-1][2] != "done":
         number, text, state, reason, _ = ends[-1]
         raise Stopped(

@@ -12,6 +12,9 @@ from rcsc.run.orders.roles import Neighbour
 if TYPE_CHECKING:
     from rcsc.lang.model import Expr  # who plays other episodes knows no language
 
+RESTARTS, ASSUMED = "RESTARTS", "ASSUMED"
+"""Kinds of what a requirement across levels may trust besides what its levels do: that none begins anew; an assumption across levels."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trusted:
@@ -87,15 +90,32 @@ class ProvedLevel:
 
 
 @dataclass(frozen=True, slots=True)
+class AcrossClaim:
+    """What is stated across levels and `rcsc prove` calls proved.
+
+    Attributes:
+        scheduled: Whether it is proved of the system as it is scheduled only; else under any timing.
+        words: The verdict in words.
+    """
+
+    name: str
+    scheduled: bool
+    words: str
+    trusts: tuple[Trusted, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Claims:
     """All that was proved of a system.
 
     Attributes:
         why: Why there are none, in words; empty where there are.
+        across: What was proved across levels.
     """
 
     levels: tuple[ProvedLevel, ...] = ()
     why: str = ""
+    across: tuple[AcrossClaim, ...] = ()
 
     @property
     def every(self) -> tuple[Claim, ...]:
@@ -105,7 +125,7 @@ class Claims:
     @property
     def digest(self) -> str:
         """The same for the same claims, wherever they were proved."""
-        return hashlib.sha256(repr(self.levels).encode()).hexdigest()
+        return hashlib.sha256(repr((self.levels, self.across)).encode()).hexdigest()
 
 
 Unwatched: TypeAlias = tuple[Claim, str]

@@ -22,7 +22,16 @@ from rcsc.lang.over_time import Watch
 from rcsc.lang.restart import ECHO, ECHOED, NUMBER, NUMBERS, STATUS
 from rcsc.run.episodes.cycle import Broken, Cycle
 from rcsc.run.episodes.proved.checks import CannotWatch, Check, check_of, contract
-from rcsc.run.episodes.proved.claims import Claim, Claims, ProvedLevel, Trusted, Unwatched, WatchedNeighbour
+from rcsc.run.episodes.proved.claims import (
+    ASSUMED,
+    RESTARTS,
+    Claim,
+    Claims,
+    ProvedLevel,
+    Trusted,
+    Unwatched,
+    WatchedNeighbour,
+)
 from rcsc.run.episodes.proved.cycles import Now, Reader
 from rcsc.run.episodes.stand import Stand
 from rcsc.run.levels import RunningLevel
@@ -37,6 +46,7 @@ class ProvedHolds:
 
     Attributes:
         watched: The claims that are looked at; `unwatched`, those that cannot be, each with why.
+        together: The claims across levels that are looked at, by name.
     """
 
     def __init__(self, claims: Claims, stand: Stand) -> None:
@@ -47,6 +57,7 @@ class ProvedHolds:
         self.unwatched: list[Unwatched] = []
         self._checks: dict[str, list[tuple[Claim, Check]]] = {}
         self._endings: dict[str, _Endings] = {}
+        self.together = {claim.name: claim for claim in claims.across if all(map(_known, claim.trusts))}
         for level in claims.levels:
             self._take(level)
         self._before: dict[str, Values] = {}
@@ -83,10 +94,22 @@ class ProvedHolds:
         ran = [(level.name, self._now(cycle, level)) for level in cycle.ran if level.name in self._readers]
         for name, now in ran:
             self._trusts.watch(name, now)
+        self._trusts.together(cycle)
         for name, now in ran:
             for claim, wrong in self._wrong(name, now):
                 if not any(trust in self._trusts.broken for trust in claim.trusts):
                     yield Broken(f"{name}: {PROVED}: {claim.words}", wrong, name, proved=True)
+        yield from self._across(cycle)
+
+    def _across(self, cycle: Cycle) -> Iterator[Broken]:
+        """Yield what is broken of what was proved across levels."""
+        for stated, shown in cycle.broken:
+            claim = self.together.get(stated.name)
+            if claim is None or (claim.scheduled and cycle.unscheduled):
+                continue
+            if not any(trust in self._trusts.broken for trust in claim.trusts):
+                name = f"{PROVED}: {stated.word} `{claim.name}` across levels"
+                yield Broken(name, f"`{stated.text}` is broken: {shown}", proved=True, across=True)
 
     def untrusted(self, level: str) -> Iterator[str]:
         """Yield what was broken so far of what claims about a level take for granted."""
@@ -144,7 +167,10 @@ class _Trusts:
         self.broken: dict[Trusted, str] = {}
         self._of: dict[str, list[tuple[Trusted, Check]]] = {name: [] for name in readers}
         levels = {level.name: level for level in claims.levels}
-        for trusted in dict.fromkeys(trust for claim in claims.every for trust in claim.trusts):
+        self._whole = tuple(dict.fromkeys(trust for claim in claims.across for trust in claim.trusts))
+        for trusted in dict.fromkeys(
+            (*(trust for claim in claims.every for trust in claim.trusts), *self._whole)
+        ):
             for name, check in _looked_at(trusted, levels, readers, stand):
                 self._of[name].append((trusted, check))
 
@@ -154,10 +180,22 @@ class _Trusts:
             if trusted not in self.broken and (wrong := check(now)):
                 self.broken[trusted] = f"level `{name}`: {wrong}"
 
+    def together(self, cycle: Cycle) -> None:
+        """All levels have done a cycle: what is trusted of all of them, and across them."""
+        assumed = {stated.name for stated, _ in cycle.broken if stated.assumed}
+        for trusted in self._whole:
+            begins = trusted.kind == RESTARTS and cycle.restarted
+            if begins or (trusted.kind == ASSUMED and trusted.name in assumed):
+                self.broken.setdefault(trusted, f"cycle {cycle.tick}")
+
 
 def _known(trusted: Trusted) -> bool:
     """Whether an episode can tell where it is broken."""
-    return trusted.kind in _MAKERS or trusted.kind in MEANWHILE or trusted.kind == "PROTOCOL"
+    return (
+        trusted.kind in _MAKERS
+        or trusted.kind in MEANWHILE
+        or trusted.kind in {"PROTOCOL", RESTARTS, ASSUMED}
+    )
 
 
 def _looked_at(
