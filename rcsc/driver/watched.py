@@ -32,7 +32,7 @@ from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
-from rcsc.compose.together.kept import answered
+from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, Question
 from rcsc.compose.together.words import stated_across
@@ -81,7 +81,8 @@ def _across(
     if stated is None:
         return
     for one in stated[0].properties:
-        found = answered(Question(systems, system, stated[0], one, proofs), cache)
+        question = Question(systems, system, stated[0], one, proofs)
+        found = (None if cache is None else recalled(question, cache)) or answered(question, cache)
         closed = found.closed(systems, proof.closed)
         if not closed.proved:
             continue

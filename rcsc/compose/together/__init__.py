@@ -13,6 +13,7 @@ become one transition system, of as few levels as the proof needs, and the engin
 | `played` | runs of the whole system, as the interpreter does them |
 | `kept` | verdicts that an earlier run found |
 | `needed` | what a proof needs of the levels |
+| `said` | verdicts in words |
 | `repeated` | such a run on the executors, and kept as a log |
 
 Example: a boss lets one of two hands run, both tell it so a tick later. `always not (left.runs and right.runs)` is proved of the three as

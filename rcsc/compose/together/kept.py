@@ -1,7 +1,8 @@
 """Verdicts on requirements across levels that an earlier run found.
 
 The key is all that a verdict depends on: the requirement, what is assumed beside it, every level that writes to those it names, directly or
-not, and how they are connected; and rcsc itself (`base.host.cache`). What is not proved is not kept: a run is looked for again.
+not, and how they are connected; and rcsc itself (`base.host.cache`). Of what is not proved the verdict is kept, and no run: it is looked
+for again where it is to be shown.
 """
 
 import hashlib
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """A proof as it is kept."""
+    """A verdict as it is kept."""
 
+    proved: bool
     timing: str
     levels: tuple[str, ...]
     by: str
@@ -31,45 +33,62 @@ class _Kept:
     restarts: bool
     vacuous: bool
     assumed: tuple[str, ...]
+    stuck: bool
+    looked: int
+    ticks: int
+    run_late: tuple[dict[str, int], ...]
 
 
 def answered(question: Question, cache: Cache | None) -> Across:
     """Return the answer to a question: an earlier one, if nothing has changed and it was a proof."""
-    key = _key(question)
-    kept = None if cache is None else cache.load(_Kept, "across", key)
-    if kept is not None:
-        around = Surroundings(kept.refuses, kept.restarts)
-        return Across(
-            question.stated,
-            True,
-            Timing(kept.timing),
-            kept.levels,
-            kept.by,
-            around,
-            vacuous=kept.vacuous,
-            late=question.system.late_ticks,
-            assumed=kept.assumed,
-        )
+    kept = None if cache is None else recalled(question, cache)
+    if kept is not None and kept.proved:
+        return kept
     cut_before = smt.cut_short()
     found = question.answer()
-    if (
-        cache is not None and found.proved and smt.cut_short() == cut_before
-    ):  # else another machine might find something else
-        around = found.around
-        cache.store(
-            _Kept(
-                found.timing.value,
-                found.levels,
-                found.by,
-                around.refuses,
-                around.restarts,
-                found.vacuous,
-                found.assumed,
-            ),
-            "across",
-            key,
-        )
+    if cache is not None and smt.cut_short() == cut_before:  # else another machine might find something else
+        cache.store(_to_keep(found), "across", _key(question))
     return found
+
+
+def recalled(question: Question, cache: Cache) -> Across | None:
+    """Return the verdict of an earlier run, without a run that breaks the requirement; None where nobody asked."""
+    kept = cache.load(_Kept, "across", _key(question))
+    if kept is None:
+        return None
+    return Across(
+        question.stated,
+        kept.proved,
+        Timing(kept.timing),
+        kept.levels,
+        kept.by,
+        Surroundings(kept.refuses, kept.restarts),
+        question.system.late_ticks,
+        run_late=kept.run_late,
+        looked=kept.looked,
+        vacuous=kept.vacuous,
+        assumed=kept.assumed,
+        stuck=kept.stuck,
+        ticks=kept.ticks,
+    )
+
+
+def _to_keep(found: Across) -> _Kept:
+    around = found.around
+    return _Kept(
+        found.proved,
+        found.timing.value,
+        found.levels,
+        found.by,
+        around.refuses,
+        around.restarts,
+        found.vacuous,
+        found.assumed,
+        found.stuck,
+        found.looked,
+        len(found.run),
+        tuple(map(dict, found.run_late)),
+    )
 
 
 def _key(question: Question) -> str:

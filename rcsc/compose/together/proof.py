@@ -86,6 +86,7 @@ class Across:
         vacuous: Whether it is proved, too, that nothing ever asks for its response.
         assumed: The assumptions across levels that it may rest on.
         stuck: Whether it is open because what is assumed across levels was not shown to be kept for ever.
+        ticks: Of a run that breaks it, where the run itself was not kept.
     """
 
     stated: Property
@@ -102,11 +103,17 @@ class Across:
     vacuous: bool = False
     assumed: tuple[str, ...] = ()
     stuck: bool = False
+    ticks: int = 0
+
+    @property
+    def broken_in_tick(self) -> int:
+        """The last tick of the run that breaks it; 0 where none is known."""
+        return len(self.run) or self.ticks
 
     @property
     def refuted(self) -> bool:
         """Whether a run of the system breaks it, in the surroundings in which it is not proved."""
-        return bool(self.run) and not self.proved
+        return self.broken_in_tick > 0 and not self.proved
 
     def trusts(self, systems: Mapping[str, TransitionSystem]) -> tuple[str, ...]:
         """Return what is trusted of the surroundings of its levels, besides what these rest on."""

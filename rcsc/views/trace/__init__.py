@@ -13,7 +13,7 @@ and every line of Python, lies in a piece with an origin, or is a finding.
 Trusted: what the templates and the emitter say of their lines. Whether the code of a line does what the line says is no question here:
 `rcsc test` answers it. What it costs: a proof of the tables, and the search for vectors, which `--no-vectors` leaves out.
 
-Modules: `matrix` (all of one program),
+Modules: `matrix` (all of one program), `across` (requirements across levels, by the lines that reach them),
 `requirements` (their standing; against a list), `tables_of` (CSV and JSON), `kept` (a kept matrix against this one), `page`
 (HTML), `answer` (one question), `collect` (all of it, for the command, with what is proved), `names` (the data dictionary).
 """

@@ -32,10 +32,13 @@ from rcsc.driver.compile import (
 )
 from rcsc.driver.outline import known as known_of
 from rcsc.driver.pipeline import Proved, proved
+from rcsc.driver.requirements import Read, known_requirements, read
 from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.driver.trials import whole_vectors
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import project_root, systems_above
+from rcsc.run.description import description
+from rcsc.views.trace.across import declared_across, of_lines
 from rcsc.views.trace.kept import against, kept, names_of
 from rcsc.views.trace.matrix import REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
 from rcsc.views.trace.page import page
@@ -122,9 +125,13 @@ def trace(settings: Settings, wanted: Wanted) -> Traced:
         return Traced(Conclusion(report, "nothing was traced: not everything is proved"))
     cache = open_cache(Path(project_root(str(project.executable[0][0])))) if project.executable else None
     plans = [(root, planned(program), program) for root, program in project.executable]
-    matrices = [_matrix(project, plan, program, settings, wanted, cache) for _, plan, program in plans]
+    whole = {path: read(path, cache) for path in systems if description(path).requirements is not None}
+    matrices = [
+        _matrix(project, plan, program, settings, wanted, cache, tuple(whole.values()))
+        for _, plan, program in plans
+    ]
     by_root = {os.path.realpath(root): plan for root, plan, _ in plans}
-    matrices += [_of_system(by_root, path) for path in systems]
+    matrices += [_of_system(by_root, path, whole.get(path), cache) for path in systems]
     settings.progress("")
     found = [*_untraced(matrices), *refuted(matrices), *_lying(project, systems, wanted.code)]
     if wanted.requirements is not None:
@@ -151,6 +158,7 @@ def _matrix(
     settings: Settings,
     wanted: Wanted,
     cache: Cache | None,
+    systems: Sequence[Read],
 ) -> Matrix:
     settings.progress(f"tracing {program.program.file}")
     [proof] = [proof for proof in project.proofs if proof.proved is program]
@@ -167,6 +175,7 @@ def _matrix(
         whole_vectors(program, settings) if wanted.vectors else None,
         properties,
         project.loaded.sources,
+        {at: told for its in systems for at, told in of_lines(its, program.program.name).items()},
     )
     return matrix(plan, known)
 
@@ -258,11 +267,12 @@ def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
                     yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
 
 
-def _of_system(plans: dict[str, Plan], path: Path) -> Matrix:
-    """Build the matrix of the C of a whole system, which is made of its description, with what its scripts test."""
+def _of_system(plans: dict[str, Plan], path: Path, its: Read | None, cache: Cache | None) -> Matrix:
+    """Build the matrix of a whole system: its C, which is made of its description, what its scripts test, what its levels keep together."""
     generated = Generated(("c",), defensive=False, plans=plans)
     generated.add_system(path)
-    return replace(of_system(generated.systems[path], str(path)), declared=tuple(of_scripts(path)))
+    across = () if its is None else tuple(declared_across(its, known_requirements(its, cache)))
+    return replace(of_system(generated.systems[path], str(path)), declared=(*across, *of_scripts(path)))
 
 
 # --- what is told ---

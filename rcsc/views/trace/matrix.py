@@ -4,7 +4,7 @@ In: a proved program, its plan, its emitted files, what was proved and which vec
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.base.diagnostics.source import Source, Span
@@ -194,6 +194,7 @@ class ProgramFacts:
         vectors: Of the whole C; None where they were not asked for.
         properties: What is proved of each property.
         sources: Texts of the tables, for the numbers of lines.
+        across: By table and line, the requirements across levels that it has a part in, each with how.
     """
 
     tables: Mapping[str, TableProof]
@@ -201,6 +202,7 @@ class ProgramFacts:
     vectors: VectorSet | None = None
     properties: Mapping[str, str] = field(default_factory=dict)
     sources: Mapping[str, Source] = field(default_factory=dict)
+    across: Mapping[tuple[str, str], Sequence[tuple[str, str]]] = field(default_factory=dict)
 
 
 def matrix(plan: Plan, known: ProgramFacts) -> Matrix:
@@ -288,7 +290,10 @@ class _Build:
             line.conditions,
             tuple(dict.fromkeys(f"{action.heading}: {action.text}" for action in line.actions)),
             tuple(self.called(body)),
-            tuple(self._properties(set(self.written(body)), tested)),
+            (
+                *self._properties(set(self.written(body)), tested),
+                *self.known.across.get((str(table.table.name), str(line.name)), ()),
+            ),
             tuple(told for at, told in self.known.findings if _inside(at, span)),
             self._tests(table, line),
         )

@@ -53,7 +53,7 @@ class Standing:
     @property
     def refuted(self) -> bool:
         """Whether it was found not to hold."""
-        return self.verdict.startswith(REFUTED)
+        return self.verdict.startswith((REFUTED, "refuted"))
 
 
 def standings(matrices: Iterable[Matrix]) -> dict[str, list[Standing]]:

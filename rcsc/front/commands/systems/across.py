@@ -7,11 +7,9 @@ from typing import Any
 
 import click
 
-from rcsc.base.diagnostics import report
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.cache import Cache
 from rcsc.code.testing.figures import counted
-from rcsc.compose.contract.claims import declared
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings
 from rcsc.compose.counterexample.finding import rows
@@ -19,9 +17,9 @@ from rcsc.compose.coverage.covered import Coverage
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
 from rcsc.compose.together.needed import core_across
-from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question, Surroundings
+from rcsc.compose.together.proof import Across, Question, Surroundings
 from rcsc.compose.together.repeated import finding_of, repeated
+from rcsc.compose.together.said import said, state
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
 from rcsc.front.commands.shared.stopped import attach, say_error
@@ -31,17 +29,6 @@ from rcsc.lang.project import Loaded
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
 _FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
-
-
-def timing_of(found: Across) -> str:
-    """Return under which timing something is proved, in words."""
-    match found.timing:
-        case Timing.ANY:
-            return "under any timing"
-        case Timing.LATE:
-            return f"with buffers at most {counted(found.late, 'tick')} late"
-        case Timing.SCHEDULED:
-            return "as scheduled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,23 +77,8 @@ def answers(
 
 def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found: Across) -> str:
     """Return the verdict in words, with the timing, the levels, what it rests on and what it trusts."""
-    levels = ", ".join(f"`{name}`" for name in found.levels)
-    if not found.proved:
-        if found.refuted:
-            how = "with late buffers" if any(found.run_late) else "as scheduled"
-            return f"refuted in tick {len(found.run)}, {how}, by a run of {levels}"
-        if found.stuck:
-            return "not proved: what is assumed across levels was not shown to be kept for ever"
-        return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
     closed = found.closed(systems, whole.closed)
-    where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
-    if closed.lacks:
-        return f"rests on {named(whole, '', closed.lacks)}; given that, proved {where}"
-    trusts = [
-        *declared(closed.trusts),
-        *(trust for trust in closed.trusts if trust in {NO_RESTART, NEVER_LATE}),
-    ]
-    return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts)}"
+    return said(found, closed, named(whole, "", closed.lacks))
 
 
 def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers) -> Iterator[str]:
@@ -229,21 +201,12 @@ def _one(
     explanation: Explanation | None,
 ) -> dict[str, Any]:
     closed = found.closed(systems, whole.closed)
-    verdict = (
-        "proved"
-        if closed.proved
-        else "conditional"
-        if found.proved
-        else "refuted"
-        if found.refuted
-        else "open"
-    )
     finding = None if explanation is None else explanation.finding
     return {
         "name": found.stated.name,
         "says": found.stated.text,
         "requirements": list(found.stated.requirements),
-        "verdict": verdict,
+        "verdict": state(found, closed),
         "timing": found.timing.value,
         "levels": list(found.levels),
         "rests_on": [named(whole, "", [need]) for need in closed.lacks],

@@ -1,0 +1,58 @@
+"""A verdict on a requirement across levels in words, the same wherever it is told.
+
+In: an answer, and what it rests on. Out: text.
+"""
+
+from rcsc.base.diagnostics import report
+from rcsc.code.testing.figures import counted
+from rcsc.compose.contract.claims import Closed, declared
+from rcsc.compose.together.product import Timing
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across
+
+
+def said(found: Across, closed: Closed, lacking: str) -> str:
+    """Return the verdict in words, with the timing, the levels, what it rests on and what it trusts.
+
+    Args:
+        found: The answer.
+        closed: The same with all that it rests on.
+        lacking: What of that is not proved, in words.
+    """
+    levels = ", ".join(f"`{name}`" for name in found.levels)
+    if not found.proved:
+        if found.refuted:
+            how = "with late buffers" if any(found.run_late) else "as scheduled"
+            return f"refuted in tick {found.broken_in_tick}, {how}, by a run of {levels}"
+        if found.stuck:
+            return "not proved: what is assumed across levels was not shown to be kept for ever"
+        return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
+    where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
+    if closed.lacks:
+        return f"rests on {lacking}; given that, proved {where}"
+    return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts_of(closed))}"
+
+
+def timing_of(found: Across) -> str:
+    """Return under which timing something is proved, in words."""
+    match found.timing:
+        case Timing.ANY:
+            return "under any timing"
+        case Timing.LATE:
+            return f"with buffers at most {counted(found.late, 'tick')} late"
+        case Timing.SCHEDULED:
+            return "as scheduled"
+
+
+def trusts_of(closed: Closed) -> list[str]:
+    """Return what a verdict trusts that people have to know: assumptions, refusals, restarts, buffers in time."""
+    return [
+        *declared(closed.trusts),
+        *(trust for trust in closed.trusts if trust in {NO_RESTART, NEVER_LATE}),
+    ]
+
+
+def state(found: Across, closed: Closed) -> str:
+    """Return the verdict in one word."""
+    if found.proved:
+        return "proved" if closed.proved else "conditional"
+    return "refuted" if found.refuted else "open"
