@@ -46,7 +46,7 @@ class KnownRequirement:
         place: File and line.
         state: `proved`, `conditional` (rests on what is not proved), `refuted`, `open`, `unknown`, or `assumed`.
         words: The verdict in words.
-        timing: `any` or `scheduled`; empty for one of a level, which is proved under any, and where nothing is proved.
+        timing: `any`, `late` or `scheduled`; empty for one of a level, which is proved under any, and where nothing is proved.
         levels: Those that the proof is about, or that its run is of.
         trusts: What the verdict trusts.
         tick: In which a run breaks it; 0 where none is known.

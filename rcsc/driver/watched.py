@@ -35,6 +35,7 @@ from rcsc.compose.proof.system import SystemProof, prove_transition_systems, rea
 from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, Question
+from rcsc.compose.together.said import timing_of
 from rcsc.compose.together.words import stated_across
 from rcsc.run.description import Description, description
 from rcsc.run.episodes.proved.claims import (
@@ -95,8 +96,7 @@ def _across(
             else Trusted(*trust_of(words), words)
             for words in closed.trusts
         )
-        scheduled = found.timing is Timing.SCHEDULED
-        yield AcrossClaim(one.name, scheduled, "as scheduled" if scheduled else "under any timing", trusts)
+        yield AcrossClaim(one.name, found.timing is not Timing.ANY, timing_of(found), trusts)
 
 
 def proved_claims(path: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> Claims:

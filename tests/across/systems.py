@@ -50,7 +50,9 @@ class LateMemory(CommonMemory):
         self.by: dict[str, int] = {}
 
     def latest(self, name: str) -> Any:
-        """Return what the buffer held then."""
+        """Return what the buffer held then; what it holds where none is late."""
+        if not self.most:
+            return super().latest(name)
         past = self.past.get(name, ())
         by = self.by.get(name, 0)
         return past[-1 - by] if by < len(past) else None

@@ -61,5 +61,5 @@ def _unscheduled(claim: AcrossClaim | None, cycle: Cycle) -> str:
     """Return the fault by which the cycle is none of the system as it is scheduled; empty where that explains nothing."""
     if not cycle.unscheduled or (claim is not None and not claim.scheduled):
         return ""
-    known = "it is proved as scheduled only" if claim is not None else "it is not proved under any timing"
+    known = f"it is proved {claim.words} only" if claim is not None else "it is not proved under any timing"
     return f"{cycle.unscheduled}, and {known}"

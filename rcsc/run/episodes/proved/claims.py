@@ -94,7 +94,7 @@ class AcrossClaim:
     """What is stated across levels and `rcsc prove` calls proved.
 
     Attributes:
-        scheduled: Whether it is proved of the system as it is scheduled only; else under any timing.
+        scheduled: Whether it is proved only of a system whose buffers come in time, or so many ticks late; else under any timing.
         words: The verdict in words.
     """
 
