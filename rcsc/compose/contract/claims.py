@@ -176,14 +176,19 @@ something ends the second."""
 
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
-    """Select from what is trusted, in order, the assumptions of tables and those about refusals."""
-    named = (trust for trust in set(trusts) if trust.endswith(DECLARED) or of_refusals(trust))
+    """Select from what is trusted, in order, the assumptions of tables, and those about refusals and timing."""
+    named = (t for t in set(trusts) if t.endswith(DECLARED) or of_refusals(t) or of_timing(t))
     return tuple(sorted(trust.removesuffix(DECLARED) for trust in named))
 
 
 def of_refusals(trust: str) -> bool:
     """Return whether the assumption is that something is not refused, at all or for ever."""
     return trust.endswith((NEVER_REFUSED, NOT_FOR_EVER, IN_RANGE))
+
+
+def of_timing(trust: str) -> bool:
+    """Return whether the assumption is that a level takes what others give as they are scheduled, or not much later."""
+    return trust_of(trust)[0] in {Trust.SCHEDULED.name, Trust.LATE.name}
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:
@@ -225,6 +230,8 @@ class Trust(Enum):
     RESTS = "`LEVEL` comes to rest some time where it is told to, and stays so"
     ANSWERS = "`LEVEL` answers every order that is not replaced, and stays so"
     STILL = "the values in `NAME` of level `LEVEL` stand still meanwhile"
+    SCHEDULED = "level `LEVEL` takes what others give as scheduled"
+    LATE = "level `LEVEL` takes what others give at most `NAME` ticks late"
     EXTERNS_FINITE = "extern procedures of level `LEVEL` are not refused for ever"
 
 

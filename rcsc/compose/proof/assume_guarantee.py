@@ -69,8 +69,14 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     name = proof.level
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
+    together = {one.key: one for one in proof.together}
     for obligation, verdict in proof.verdicts:
-        if (bound := proof.bound(obligation.key)) is not None:
+        if (shown := together.get(obligation.key)) is not None:
+            yield (
+                obligation.key,
+                Claim(verdict, tuple((level, RUNS) for level in shown.levels), shown.trusts),
+            )
+        elif (bound := proof.bound(obligation.key)) is not None:
             yield obligation.key, _of_bound(ts, proof, bound)
         elif obligation.key != SAFE:
             yield obligation.key, Claim(verdict, runs, _trusted(ts, proof, obligation))

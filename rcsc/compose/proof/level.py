@@ -83,6 +83,7 @@ class LevelProof:
         conditions: Those that exact engines found, of which the last predicates are made.
         exact: Whether it is confirmed only of terms in which all arithmetic of integers is exact (`keyed.ExactIntegers`).
         bounds: For how long each requirement that may wait for ever does so at most, of those proved.
+        together: What is proved of it together with other levels alone (`compose.together.left_open`): no certificate is of that.
     """
 
     level: str
@@ -102,6 +103,7 @@ class LevelProof:
     conditions: tuple[Found, ...] = ()
     exact: bool = False
     bounds: "tuple[Bound, ...]" = ()
+    together: "tuple[ProvedTogether, ...]" = ()
 
     def bound(self, key: Key) -> "Bound | None":
         """Return the bound by which a requirement that may wait for ever is proved; None for any other obligation."""
@@ -146,6 +148,21 @@ class LevelProof:
     def open(self) -> tuple[Obligation, ...]:
         """The obligations that are not proved."""
         return tuple(obligation for obligation, verdict in self.verdicts if verdict not in ACCEPTED)
+
+
+@dataclass(frozen=True, slots=True)
+class ProvedTogether:
+    """An obligation of a level that is proved of several together.
+
+    Attributes:
+        key: Its key.
+        levels: Those that the proof is about.
+        trusts: What it trusts, in words: when levels take what others give, that inputs are not refused.
+    """
+
+    key: Key
+    levels: tuple[str, ...]
+    trusts: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

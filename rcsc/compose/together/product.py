@@ -23,7 +23,7 @@ Trusted is this module, as `contract.transition` is; that every cycle goes on, a
 proved of each level alone and taken from there.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import lcm
@@ -68,12 +68,15 @@ class Tick(Cycle):
         restarts: For each level, that it begins anew before it; `refuses`, that it is refused an input if it runs.
         takes: For each level, what it takes of what no buffer here holds.
         late: For each buffer and reader, by the reader's end, how late it is seen.
+        cycles: The cycle of each level, and `due`, that it runs.
     """
 
     restarts: Mapping[str, Node] = field(default_factory=dict)
     refuses: Mapping[str, Node] = field(default_factory=dict)
     takes: Mapping[str, Leaves] = field(default_factory=dict)
     late: Leaves = field(default_factory=dict)
+    cycles: Mapping[str, Cycle] = field(default_factory=dict)
+    due: Mapping[str, Node] = field(default_factory=dict)
 
     @property
     def cases(self) -> tuple[Node, ...]:
@@ -254,6 +257,8 @@ class Together(TransitionSystem):
             restarts=restarts,
             takes=takes,
             late=late,
+            cycles=cycles,
+            due=due,
             refuses={name: each.untaken for name, each in cycles.items()},
         )  # fmt: skip
 
@@ -399,6 +404,12 @@ def together(
         timing=timing,
         most_late=system.late_ticks,
     )
+
+
+def writers(system: Description, levels: Container[str], readers: Collection[str]) -> frozenset[str]:
+    """Return the levels that write to one of these."""
+    ends = ((w.source.partition(".")[0], w.target.partition(".")[0]) for w in system.wires)
+    return frozenset(party for party, reader in ends if reader in readers and party in levels)
 
 
 def _known(chosen: Collection[str], sources: Mapping[str, Source]) -> Iterator[str]:

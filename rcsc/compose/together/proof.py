@@ -34,7 +34,7 @@ from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
 from rcsc.compose.together.features import features, of_member, unlike
 from rcsc.compose.together.played import PlayedRun, Ticks, plainest
-from rcsc.compose.together.product import Timing, Together, read_by_all, together
+from rcsc.compose.together.product import Timing, Together, read_by_all, together, writers
 from rcsc.lang.model import Program, Property
 from rcsc.lang.over_time.past import TRUE, negation
 from rcsc.proof.solvers.sat import GaveUpError
@@ -311,11 +311,7 @@ class Question:
         """Yield these levels and those that write to them, directly or by so many others."""
         here = set(names)
         for _ in range(steps):
-            here |= {
-                wire.source.partition(".")[0]
-                for wire in self.system.wires
-                if wire.target.partition(".")[0] in here
-            } & self.systems.keys()
+            here |= writers(self.system, self.systems, here)
         yield from (name for name in self.systems if name in here)
 
     def invariant(self, found: Across) -> "tuple[Together, Shown] | None":
@@ -396,7 +392,7 @@ def shown(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) ->
     chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
     of_levels = dict(_clauses(ts, chosen, lemmas))
     held = tuple(of_levels)
-    found, by = _searched((*firsts, step), owed, chosen, held), ""
+    found, by = searched((*firsts, step), owed, chosen, held), ""
     if exact:
         more = helped(ts, firsts, step, wanted, found, MOST_STEPS)
         found, by = more.invariant, next(iter(more.by.values()), "")
@@ -421,7 +417,7 @@ def goes_on(ts: Together, firsts: Sequence[Cycle], step: Cycle) -> bool:
     if not all(holds.known and holds.low for holds in at_first):
         return False
     chosen = unlike(features(ts, step, [one.holds for one in owed[-1]]))
-    found = _searched((*firsts, step), owed, chosen, ())
+    found = searched((*firsts, step), owed, chosen, ())
     if found.open:
         return False
     with suppress(NotConfirmedError, GaveUpError):
@@ -457,7 +453,7 @@ def _holds(chosen: Sequence[Predicate], clause: Clause, state: Leaves) -> bool:
     return False
 
 
-def _searched(
+def searched(
     cycles: Sequence[Cycle],
     owed: Sequence[Sequence[Obligation]],
     chosen: tuple[Predicate, ...],

@@ -18,6 +18,7 @@ from rcsc.lang.model import (
     Int,
     Kind,
     Program,
+    Property,
     Real,
     Record,
     RecordField,
@@ -118,9 +119,20 @@ def resolve_across(
             )
     if scope.diagnostics:
         return _sorted(scope)
-    stem = root.rpartition("/")[2].removesuffix(".rcs")
+    return _program(scope, root, enums, every)
+
+
+def stating_nothing(parties: Parties) -> Program:
+    """Return the program of these parties that requires nothing of them."""
+    scope = Scope(diagnostics=[], periods=())
+    for party, variables in parties.items():
+        _declare(scope, party, variables, Span("", 0, 0))
+    return _program(scope, "", (), ())
+
+
+def _program(scope: Scope, root: str, enums: tuple[Enum, ...], every: Sequence[Property]) -> Program:
     return Program(
-        stem,
+        root.rpartition("/")[2].removesuffix(".rcs"),
         root,
         enums,
         tuple(scope.records),

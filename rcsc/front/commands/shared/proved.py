@@ -220,6 +220,7 @@ def _lacking(whole: SystemProof) -> Iterator[str]:
     contexts = [level.context for level in whole.levels if level.context is not None]
     counts = {
         "not looked at": sum(missing.applies for level in whole.levels for missing in level.unstated),
+        "trusting a schedule": sum(len(level.together) for level in whole.levels),
         "resting on unproved ones": sum(map(len, _resting(whole).values())),
         "not shown to end": sum(not ending.proved for level in whole.levels for ending in level.endings),
         "never reached": sum(len(seen.unreached) for seen in contexts),

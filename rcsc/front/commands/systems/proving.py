@@ -37,6 +37,7 @@ from rcsc.compose.proof.system import (
     prove_transition_systems,
     read_systems,
 )
+from rcsc.compose.together.left_open import with_those_together
 from rcsc.driver.outline import keep_lines
 from rcsc.driver.unchanged import digest_at
 from rcsc.front.commands.shared.options import cores
@@ -125,8 +126,9 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
     if asked.certificate is not None:
         _write(asked.certificate, systems, proof)
-    given = None
+    alone, given = proof, None
     if not asked.only and not asked.variants:
+        proof = with_those_together(systems, settings.system, alone)
         given = _across(systems, proof, settings, cache, asked)
     if given is not None:
         sources |= given.loaded.sources
@@ -150,7 +152,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         _say(_lines(path, systems, proof, asked, sources, _More(found, coverages, given)))
     for agreement in (each for each in proof.agreements if not each.holds):
         say_error(Code.NOT_AGREED, f"level `{agreement.level}` assumes that {agreement.assumed}")
-    refused = _refused(systems, proof, quiet=asked.as_json) if asked.confirms else []
+    refused = _refused(systems, alone, quiet=asked.as_json) if asked.confirms else []
     if refused or any(explanation.bug for explanation in explanations) or across.beside(given):
         return 3
     status = 0 if proof.proved and (proof.whole or not asked.strict) else 1

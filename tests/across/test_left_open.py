@@ -1,0 +1,206 @@
+"""What the contract leaves open of a level: proved of it with its neighbours, as they run, and of nothing that they do not keep."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
+from rcsc.compose.together.left_open import with_those_together
+from rcsc.front.commands import run
+from rcsc.run.description import description
+from tests.across.systems import Drawn, Running, drawn, written
+
+_UP = """\
+input go : bool
+output a : bool safe false
+output b : bool safe false
+table t_up {
+  | line | go    || a     | b     |
+  |------|-------||-------|-------|
+  | on   | true  || true  | false |
+  | off  | false || false | true  |
+}
+level up { period 20 [ms] table t_up }
+"""
+_LOW = """\
+input a : bool
+input b : bool
+output x : bool safe false
+## The level above never sets both.
+assume not_both monitored : not (a and b)
+table t_low assuming not_both {
+  | line | a     | b     || x     |
+  |------|-------|-------||-------|
+  | a    | true  |       || true  |
+  | b    |       | true  || false |
+  | none | false | false ||       |
+}
+level low { period 20 [ms] table t_low }
+"""
+_SYSTEM = """\
+name = "plain"
+generated = "generated"
+tick_ms = 20
+[[level]]
+name = "up"
+[[level]]
+name = "low"
+[buffers]
+"w.go" = "up.go"
+"up.a" = "low.a"
+"up.b" = "low.b"
+"low.x" = "w.x"
+"""
+
+
+def _proved(folder: Path, files: Mapping[str, str] = {}) -> tuple[SystemProof, SystemProof]:
+    """Return what is proved of the levels alone, and together."""
+    texts = {"rcsc.toml": 'name = "plain"\n', "up.rcs": _UP, "low.rcs": _LOW, "system.toml": _SYSTEM, **files}
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    systems, _ = read_systems(folder / "system.toml")
+    whole = prove_transition_systems(systems, None, 1, tuple(systems))
+    return whole, with_those_together(systems, description(folder / "system.toml"), whole)
+
+
+def test_what_a_level_gives_in_one_cycle_is_known_to_who_reads_it_as_scheduled(tmp_path: Path) -> None:
+    alone, together = _proved(tmp_path)
+    assert not alone.proved
+    assert together.proved
+    claim = together.of("low", (Sort.ASSUMPTION, "t_low", "not_both"))
+    assert claim.proved
+    assert claim.trusts == ("level `low` takes what others give as scheduled",)
+
+
+_BOTH = _UP.replace("| true  | false |\n", "| true  | true  |\n")
+_BEGINS = _LOW.replace("input a : bool", "input a : bool = true").replace(
+    "input b : bool", "input b : bool = true"
+)
+_SPLIT = _SYSTEM.replace('"up.b" = "low.b"', '"w.b" = "low.b"')
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"up.rcs": _BOTH},
+        {"low.rcs": _BEGINS},
+        {"system.toml": _SPLIT},
+    ],
+    ids=["it sets both", "empty buffers hold both", "one comes from outside"],
+)
+def test_what_is_not_kept_stays_open(tmp_path: Path, files: Mapping[str, str]) -> None:
+    assert not _proved(tmp_path, files)[1].proved
+
+
+def test_two_buffers_that_may_be_late_are_of_two_cycles(tmp_path: Path) -> None:
+    late = _SYSTEM.replace("tick_ms = 20\n", "tick_ms = 20\nlate_ticks = 1\n")
+    claim = _proved(tmp_path, {"system.toml": late})[1].of("low", (Sort.ONE_LINE, "t_low", ""))
+    assert claim.trusts == ("level `low` takes what others give as scheduled",)
+
+
+def test_one_buffer_is_of_one_cycle_however_late(tmp_path: Path) -> None:
+    record = "record pair { a : bool b : bool }\n"
+    up = record + _UP.replace("output a : bool safe false\noutput b : bool safe false", "output o : pair")
+    up = up.replace("|| a     | b     |", "|| o.a   | o.b   |")
+    low = record + _LOW.replace("input a : bool\ninput b : bool", "input o : pair")
+    low = low.replace("(a and b)", "(o.a and o.b)").replace("| a     | b     |", "| o.a   | o.b   |")
+    system = _SYSTEM.replace("tick_ms = 20\n", "tick_ms = 20\nlate_ticks = 2\n")
+    system = system.replace('"up.a" = "low.a"\n"up.b" = "low.b"', '"up.o" = "low.o"')
+    claim = _proved(tmp_path, {"system.toml": system, "up.rcs": up, "low.rcs": low})[1].of(
+        "low", (Sort.ONE_LINE, "t_low", "")
+    )
+    assert claim.proved
+    assert claim.trusts == ("level `low` takes what others give at most `2` ticks late",)
+
+
+def test_prove_tells_what_trusts_a_schedule_and_strict_counts_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    _proved(tmp_path)
+    path = str(tmp_path / "system.toml")
+    capfd.readouterr()
+    assert run(["prove", path, "--no-cache"]) == 0
+    assert (
+        "not_both                 proved, trusting level `low` takes what others give as scheduled"
+        in capfd.readouterr().out
+    )
+    assert run(["prove", path, "--no-cache", "--strict"]) == 1
+    assert "2 claims trusting a schedule" in capfd.readouterr().out
+    run(["prove", path, "--no-cache", "--json"])
+    goals = json.loads(capfd.readouterr().out)["levels"][1]["goals"]
+    assert {"level `low` takes what others give as scheduled"} == {
+        t for goal in goals for t in goal["trusts"]
+    }
+
+
+# --- drawn systems -----------------------------------------------------------------------------
+
+FEW, MOST = 2, 60
+
+
+def _with_properties(made: Drawn, seed: int) -> Drawn:
+    """State properties of the first level's input and state, and the same across levels."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    files, across = dict(made.files), list[str]()
+    name = made.levels[0]
+    for at in range(5):
+        atoms = [
+            random.choice(("x", "not x", "o", "not o", *(f"n = {n}" for n in range(3)))) for _ in range(3)
+        ]
+        said = random.choice(("{0} or {1} or {2}", "{0} implies {1}", "not ({0} and {1} and {2})")).format(
+            *atoms
+        )
+        if "x" not in said:
+            continue
+        files[f"{name}.rcs"] += f"\nproperty p{at} : {said}\n"
+        across.append(f"property p{at} : {_prefixed(said, name)}")
+    files["requirements.rcs"] = "\n".join(across) + "\n"
+    return replace(made, files=files)
+
+
+def _prefixed(said: str, name: str) -> str:
+    words = said.replace("(", "( ").replace(")", " )").split()
+    return " ".join(f"{name}.{word}" if word in {"x", "o", "n"} else word for word in words)
+
+
+def judged(seed: int, folder: Path, late: int = 0) -> list[str]:
+    """Judge what is proved of a drawn system together; return the verdicts."""
+    path = written(_with_properties(drawn(seed, late), seed), folder)
+    systems, _ = read_systems(path)
+    alone = prove_transition_systems(systems, None, 1, tuple(systems))
+    whole = with_those_together(systems, description(path), alone)
+    running, verdicts = Running(path), []
+    for stated in running.program.properties:
+        key = (Sort.PROPERTY, "", stated.name)
+        claim, first = whole.of("a", key), next(iter(whole.levels))
+        if not claim.proved:
+            verdicts.append("open")
+            continue
+        admits = any("never refused" in trust for trust in claim.trusts)
+        lates = late > 0 and not any("as scheduled" in trust for trust in claim.trusts)
+        here = {"refuses": not admits, "restarts": True, "late": lates}
+        shortest = running.shortest(stated, 8, **here)
+        assert not shortest, (seed, stated.text, claim.trusts, shortest)
+        assert not running.walk(stated, seed, 300, **here), (seed, stated.text, claim.trusts)
+        verdicts.append("together" if key in {one.key for one in first.together} else "alone")
+    return verdicts
+
+
+@pytest.mark.parametrize("seed", range(FEW))
+def test_drawn_levels_keep_as_they_run_what_is_proved_of_them_together(seed: int, tmp_path: Path) -> None:
+    judged(seed, tmp_path)
+
+
+@pytest.mark.thorough
+def test_many_drawn_levels_keep_as_they_run_what_is_proved_of_them_together(tmp_path: Path) -> None:
+    verdicts = list[str]()
+    for seed in range(2000, 2000 + MOST):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        verdicts += judged(seed, folder, late=seed % 2)
+    assert {"together", "alone", "open"} <= set(verdicts)
