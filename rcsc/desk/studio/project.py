@@ -13,6 +13,7 @@ from rcsc.desk.shell.session import Session
 from rcsc.desk.studio.build import Build
 from rcsc.desk.studio.hub import Concern, Hub
 from rcsc.desk.studio.plots import Plots
+from rcsc.desk.studio.required import Required
 from rcsc.desk.studio.runs.live import LANE, WATCHED, Live, Pace
 from rcsc.desk.studio.runs.logs import Logs
 from rcsc.desk.studio.runs.timeline import TimeLine
@@ -71,4 +72,5 @@ def concerns(
         Plots(time, hub),
         Moments(hub, time, cell),
         Findings(desk),
+        Required(opening.path, kept),
     )

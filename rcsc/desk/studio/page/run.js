@@ -87,6 +87,7 @@ function toolbar(bus, drawer) {
   bus.key("i", "Order a level", () => drawer.show("script", true), "Run");
   bus.key("b", "Breakpoints, faults, broken buffers", () => drawer.show("breaks", true), "Run");
   bus.key("p", "Proof, findings and logs", () => drawer.show("found", true), "Run");
+  bus.key("q", "Requirements, as they stand", () => drawer.show("required", true), "Run");
   bus.key("v", "Variables of the level chosen", () => drawer.show("values", true), "Run");
   return make("div", { class: "bar" }, go, step, undo, rate,
     make("form", { class: "until", onsubmit: (event) => { event.preventDefault(); if (until.value.trim()) type(`run until ${until.value.trim()}`); } }, until),
@@ -198,7 +199,7 @@ function reasonTable(table, only) {
 // --- the drawer ---
 
 function Drawer(bus) {
-  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breaks and faults", breaksTab], ["script", "Orders", scriptTab], ["found", "Proof and logs", foundTab]];
+  const tabs = [["console", "Console", consoleTab], ["values", "Variables", valuesTab], ["breaks", "Breaks and faults", breaksTab], ["script", "Orders", scriptTab], ["required", "Requirements", requiredTab], ["found", "Proof and logs", foundTab]];
   const bar = make("div", { class: "bar tabs", role: "tablist" });
   const inside = make("div", { class: "inside" });
   const made = new Map();
@@ -383,6 +384,32 @@ function scriptTab(bus) {
     rows.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
   });
   return { root: make("div", { class: "column" }, form, make("div", { class: "scroll" }, none, make("table", { class: "values" }, rows))), focus: () => level.focus() };
+}
+
+const STANDS = { proved: "good", refuted: "wrong", open: "wrong", conditional: "warn" };
+
+function requiredTab(bus) {
+  const rows = make("tbody"), none = make("p", { class: "soft", hidden: true }, ...spoken("Nothing is required: `requirement` in a level's tables, or a file that `system.toml` names as `requirements`."));
+  const sums = make("span", { class: "grow soft", role: "status" });
+  const open = (one) => bus.try("log.open", { name: one.log }).then((answer) => { if (answer) bus.say(`the run that breaks \`${one.name}\` is shown to everybody`); });
+  function row(one) {
+    const verdict = make("td", {}, make("strong", { class: STANDS[one.state] ?? "soft" }, one.state), " ", make("span", { class: "soft" }, ...spoken(one.words)));
+    if (one.log) verdict.append(" ", make("button", { type: "button", "aria-label": `Show the run that breaks ${one.name}`, onclick: () => open(one) }, "Show its run"));
+    return make("tr", { "data-state": one.state, "data-name": one.name }, make("td", {}, make("code", {}, one.name), make("div", { class: "soft" }, one.level ? `${one.word} of ${one.level}` : `${one.word} across levels`), one.req.length ? make("div", { class: "soft" }, one.req.join(", ")) : null),
+      make("td", { class: "code", title: one.doc }, one.text, make("div", { class: "soft" }, one.place)), verdict,
+      make("td", { class: "soft" }, ...one.trusts.flatMap((trust) => [...spoken(trust), make("br")])));
+  }
+  async function list() {
+    const every = await bus.try("required.list") ?? [];
+    const count = (state) => every.filter((one) => one.state === state).length;
+    const states = [...new Set(every.map(({ state }) => state))];
+    sums.textContent = states.map((state) => `${count(state)} ${state}`).join(", ");
+    none.hidden = every.length > 0;
+    rows.replaceChildren(...every.map(row));
+  }
+  const again = make("button", { type: "button", onclick: list }, "List again");
+  const head = make("thead", {}, make("tr", {}, ["Name", "Says", "Verdict", "Trusts"].map((text) => make("th", {}, text))));
+  return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, sums), make("div", { class: "scroll" }, none, make("table", { class: "values" }, head, rows))), shown: list, focus: () => again.focus() };
 }
 
 function foundTab(bus) {

@@ -112,23 +112,29 @@ class Logs(Concern):
 
     def _on_list(self, ask: Ask) -> Json:
         """Return the latest logs, each with its finding."""
+        told = []
+        for name, path in self.newest():
+            ask.check()
+            with contextlib.suppress(OSError):  # it went meanwhile
+                stat = path.stat()
+                told.append(
+                    {
+                        "name": name,
+                        "bytes": stat.st_size,
+                        "changed_s": stat.st_mtime,
+                        "finding": glance(path),
+                    }
+                )
+        return told
+
+    def newest(self) -> list[tuple[str, Path]]:
+        """Return the latest logs by name, the newest first; from any lane."""
         found = []
         for name, path in self._found().items():
             with contextlib.suppress(OSError):  # it went meanwhile
-                found.append((path.stat(), name, path))
-        found.sort(key=lambda one: -one[0].st_mtime)
-        told = []
-        for stat, name, path in found[:MOST_LOGS]:
-            ask.check()
-            told.append(
-                {
-                    "name": name,
-                    "bytes": stat.st_size,
-                    "changed_s": stat.st_mtime,
-                    "finding": glance(path),
-                }
-            )
-        return told
+                found.append((path.stat().st_mtime, name, path))
+        found.sort(key=lambda one: -one[0])
+        return [(name, path) for _, name, path in found[:MOST_LOGS]]
 
     def _on_open(self, ask: Ask) -> Json:
         name = ask.body.text("name")
