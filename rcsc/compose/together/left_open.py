@@ -28,11 +28,11 @@ from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.features import features
 from rcsc.compose.together.product import Tick, Timing, Together, together, writers
 from rcsc.compose.together.proof import searched
-from rcsc.compose.together.words import parties
 from rcsc.lang.resolve.across import stating_nothing
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.run.description import Description
+from rcsc.run.log.across import parties
 
 ASKED = frozenset(
     {
