@@ -49,6 +49,7 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "Requirement",
     "RowOutcome",
     "Run",
     "Severity",

@@ -8,6 +8,7 @@ from rcsc.front.api import LoadedSystem as LoadedSystem
 from rcsc.front.api import Position as Position
 from rcsc.front.api import Proof as Proof
 from rcsc.front.api import Report as Report
+from rcsc.front.api import Requirement as Requirement
 from rcsc.front.api import RowOutcome as RowOutcome
 from rcsc.front.api import Run as Run
 from rcsc.front.api import Severity as Severity
@@ -30,6 +31,7 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "Requirement",
     "RowOutcome",
     "Run",
     "Severity",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import rcsc
 from rcsc.front.commands import run
 from tests.across.test_across import _written
 
@@ -38,3 +39,22 @@ def test_the_verdict_of_a_system_counts_its_requirements(
         requirements.count("requirement"),
         status,
     )
+
+
+def test_python_is_told_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = _written(tmp_path, BOTH + AT_ONCE)
+    assert run(["prove", str(path), "--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    proof = rcsc.prove(path)
+    assert (proof.proved, proof.whole) == (False, False)
+    assert [(one.name, one.says, one.verdict, one.vacuous) for one in proof.requirements] == [
+        (one["name"], one["says"], one["verdict"], one["vacuous"]) for one in told["requirements"]
+    ]
+    never_both, at_once = proof.requirements
+    assert (never_both.proved, never_both.words) == (True, "proved as scheduled, of `boss`, `left`, `right`")
+    assert (
+        [row.level for row in at_once.run]
+        == [row["level"] for row in told["requirements"][1]["time_line"]]
+        != []
+    )
+    assert rcsc.prove(path, levels=["left"]).requirements == ()

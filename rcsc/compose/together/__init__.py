@@ -15,7 +15,7 @@ become one transition system, of as few levels as the proof needs, and the engin
 | `kept` | verdicts that an earlier run found |
 | `needed` | what a proof needs of the levels |
 | `said` | verdicts in words |
-| `repeated` | such a run on the executors, and kept as a log |
+| `repeated` | all of a system; such a run on the executors, and kept as a log |
 
 Example: a boss lets one of two hands run, both tell it so a tick later. `always not (left.runs and right.runs)` is proved of the three as
 they are scheduled, and of no two of them. With its two wires crossed, `when boss.go_left, within 1 cycles, left.runs` is refuted in tick 3.

@@ -133,6 +133,11 @@ class Across:
         """Whether it is proved only of buffers that are never late, where the system says that they may be."""
         return self.late > 0 and self.timing is Timing.SCHEDULED
 
+    @property
+    def kinder(self) -> bool:
+        """Whether it is proved only where less befalls the levels, or their buffers, than may."""
+        return self.proved and (self.around != Surroundings() or self.kinder_timing)
+
     def closed(self, systems: Mapping[str, TransitionSystem], claims: Mapping[Need, Closed]) -> Closed:
         """Return its verdict with all that it rests on, as claims about levels have it."""
         rests = {(name, RUNS): claims.get((name, RUNS), UNKNOWN) for name in self.levels}

@@ -1,18 +1,25 @@
-"""A run that breaks a requirement across levels, repeated on the Python and the C executors, and kept as a log.
+"""The requirements across the levels of a system, answered; a run that breaks one is repeated on the executors, and kept as a log.
 
-In: an answer with a run. Out: an `Explanation` as of a level's claim, so that all that shows and keeps runs serves this one, too.
+In: a system with the proofs of its levels. Out: `Answers`. A run is an `Explanation`, as of a level's claim, so that all that shows and
+keeps runs serves this one, too.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+from rcsc.base.host.cache import Cache
 from rcsc.base.host.children import scratch
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, runs_on_executors
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
-from rcsc.compose.together.proof import Across
+from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.together.kept import answered
+from rcsc.compose.together.proof import Across, Question
+from rcsc.compose.together.words import stated_across
+from rcsc.lang.model import Program
+from rcsc.lang.project import Loaded
 from rcsc.proof.symbolic.values import TRUE
 
 
@@ -43,3 +50,47 @@ def repeated(found: Across, systems: Mapping[str, TransitionSystem], settings: T
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
     return replace(explanation, log=log, in_c=not only_in_python(finding, systems))
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The answers to all requirements across the levels of a system.
+
+    Attributes:
+        program: The file that states them, resolved.
+        loaded: The file, and all that it uses.
+        every: The answers, each with its run as the executors repeated it, where there is one.
+    """
+
+    program: Program
+    loaded: Loaded
+    every: tuple[tuple[Across, Explanation | None], ...]
+
+    @property
+    def told(self) -> bool:
+        """Whether something is told of one besides its line."""
+        return any(explanation is not None or found.vacuous for found, explanation in self.every)
+
+
+def answers(
+    systems: Mapping[str, TransitionSystem],
+    whole: SystemProof,
+    settings: TraceSettings,
+    cache: Cache | None,
+) -> Answers | None:
+    """Answer the requirements across levels; None where the system states none.
+
+    Raises:
+        NoProgramError: Their file is not in order.
+        OSError: A run cannot be kept where it should be.
+    """
+    stated = stated_across(settings.system, {name: ts.program for name, ts in systems.items()})
+    if stated is None:
+        return None
+    program, loaded = stated
+    proofs = {proof.level: proof for proof in whole.levels}
+    every = []
+    for one in program.properties:
+        found = answered(Question(systems, settings.system, program, one, proofs), cache)
+        every.append((found, repeated(found, systems, settings) if found.run else None))
+    return Answers(program, loaded, tuple(every))

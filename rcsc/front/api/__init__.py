@@ -27,6 +27,7 @@ from rcsc.front.api.proofs import (
     Claim,
     Consequence,
     Proof,
+    Requirement,
     Unproved,
     check,
     compile,  # noqa: A004  # as the command is called
@@ -43,6 +44,7 @@ __all__ = [
     "Position",
     "Proof",
     "Report",
+    "Requirement",
     "RowOutcome",
     "Run",
     "Severity",

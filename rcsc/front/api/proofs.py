@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcsc.base.diagnostics.report import Report
-from rcsc.base.host.cache import open_cache
+from rcsc.base.diagnostics.report import Report, named
+from rcsc.base.host.cache import Cache, open_cache
 from rcsc.code.emit import TARGETS
 from rcsc.compose.contract.beginning import starts
 from rcsc.compose.contract.claims import spelled
@@ -20,6 +20,8 @@ from rcsc.compose.counterexample.explain import Explanation, TraceSettings, expl
 from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
 from rcsc.compose.counterexample.trace import usual_length
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
+from rcsc.compose.together.repeated import answers
+from rcsc.compose.together.said import said, state
 from rcsc.driver import check as checking
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
@@ -158,6 +160,29 @@ class Consequence:
 
 
 @dataclass(frozen=True, slots=True)
+class Requirement:
+    """A requirement across levels, and its verdict.
+
+    Attributes:
+        says: The requirement, as it is written.
+        verdict: `proved`, `conditional` (it rests on what is not proved), `refuted` or `open`.
+        words: The same in words: of which levels, as they are scheduled or under any timing, what it rests on and trusts.
+        proved: Whether it holds, and all that it rests on; `vacuous`, whether nothing ever asks for it.
+        kinder: Whether it is proved only where less befalls levels and buffers than may.
+        run: The shortest run that breaks it, a row a tick and level, as interpreter and executors did it; empty where none was found.
+    """
+
+    name: str
+    says: str
+    verdict: str
+    words: str
+    proved: bool
+    vacuous: bool = False
+    kinder: bool = False
+    run: tuple[TimeLineRow, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Proof:
     """The proof of a system's levels together.
 
@@ -166,6 +191,7 @@ class Proof:
         whole: Whether, besides, everything was looked at and nothing rests on what is not proved.
         not_looked_at: What could not be stated, in words.
         does_not_apply: What there is nothing to state of, in words.
+        requirements: Those across levels, where all levels are proved.
     """
 
     proved: bool
@@ -174,6 +200,7 @@ class Proof:
     unproved: tuple[Unproved, ...]
     not_looked_at: tuple[str, ...]
     does_not_apply: tuple[str, ...] = ()
+    requirements: tuple[Requirement, ...] = ()
 
 
 def prove(
@@ -199,7 +226,7 @@ def prove(
         jobs: How many levels are proved at once.
 
     Raises:
-        CodedError: The description, the tables of a level, or `where` are not in order.
+        CodedError: The description, the tables of a level, the requirements across them, or `where` are not in order.
         KeyError: The system has no such level.
     """
     path = Path(system)
@@ -210,16 +237,42 @@ def prove(
     kept = open_cache(path.parent) if cache else None
     proof = prove_transition_systems(systems, None, jobs, tuple(levels) or tuple(systems), cache=kept)
     most = usual_length(systems.values()) if cycles is None else cycles
-    runs = explain(systems, proof, TraceSettings(description(path), most, further=follow, starts=begins))
+    settings = TraceSettings(description(path), most, further=follow, starts=begins)
+    runs = explain(systems, proof, settings)
+    across = tuple(_requirements(systems, proof, settings, kept)) if not levels else ()
     left = [(level.level, unstated) for level in proof.levels for unstated in level.unstated]
     return Proof(
-        proof.proved,
-        proof.whole,
+        proof.proved and all(one.verdict in {"proved", "conditional"} for one in across),
+        proof.whole and all(one.proved and not one.vacuous and not one.kinder for one in across),
         tuple(_claims(proof)),
         tuple(_unproved(systems, explanation) for explanation in runs),
         tuple(f"{name}: {unstated.shown}" for name, unstated in left if unstated.applies),
         tuple(f"{name}: {unstated.shown}" for name, unstated in left if not unstated.applies),
+        across,
     )
+
+
+def _requirements(
+    systems: "Mapping[str, TransitionSystem]",
+    proof: SystemProof,
+    settings: TraceSettings,
+    cache: Cache | None,
+) -> Iterator[Requirement]:
+    given = answers(systems, proof, settings, cache)
+    for found, explanation in () if given is None else given.every:
+        closed = found.closed(systems, proof.closed)
+        lacking = named([spelled(need, "", proof.closed) for need in closed.lacks])
+        finding = None if explanation is None or explanation.beside else explanation.finding
+        yield Requirement(
+            found.stated.name,
+            found.stated.text,
+            state(found, closed),
+            said(found, closed, lacking),
+            found.proved and closed.proved,
+            found.vacuous,
+            found.kinder,
+            () if finding is None else tuple(rows(systems, finding)),
+        )
 
 
 def _claims(proof: SystemProof) -> Iterator[Claim]:

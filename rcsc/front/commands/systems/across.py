@@ -1,78 +1,30 @@
 """What `rcsc prove` says of requirements across levels: first of all, for they are what the levels are for."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from rcsc.base.diagnostics.codes import Code
-from rcsc.base.host.cache import Cache
 from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings
 from rcsc.compose.counterexample.finding import rows
 from rcsc.compose.coverage.covered import Coverage
 from rcsc.compose.proof.system import SystemProof
-from rcsc.compose.together.kept import answered
 from rcsc.compose.together.needed import core_across
-from rcsc.compose.together.proof import Across, Question, Surroundings
-from rcsc.compose.together.repeated import finding_of, repeated
+from rcsc.compose.together.proof import Across, Question
+from rcsc.compose.together.repeated import Answers, finding_of
 from rcsc.compose.together.said import said, state
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands.shared.proved import named
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.systems.explained import say_exercise, say_run
-from rcsc.lang.model import Program
-from rcsc.lang.project import Loaded
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
 _FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
-
-
-@dataclass(frozen=True, slots=True)
-class Answers:
-    """The answers to all requirements across the levels of a system.
-
-    Attributes:
-        program: The file that states them, resolved.
-        loaded: The file, and all that it uses.
-        every: The answers, each with its run as the executors repeated it, where there is one.
-    """
-
-    program: Program
-    loaded: Loaded
-    every: tuple[tuple[Across, Explanation | None], ...]
-
-    @property
-    def told(self) -> bool:
-        """Whether something is told of one besides its line."""
-        return any(explanation is not None or found.vacuous for found, explanation in self.every)
-
-
-def answers(
-    systems: Mapping[str, TransitionSystem],
-    whole: SystemProof,
-    settings: TraceSettings,
-    cache: Cache | None,
-) -> Answers | None:
-    """Answer the requirements across levels; None where the system states none.
-
-    Raises:
-        NoProgramError: Their file is not in order.
-        OSError: A run cannot be kept where it should be.
-    """
-    stated = stated_across(settings.system, {name: ts.program for name, ts in systems.items()})
-    if stated is None:
-        return None
-    program, loaded = stated
-    proofs = {proof.level: proof for proof in whole.levels}
-    every = []
-    for one in program.properties:
-        found = answered(Question(systems, settings.system, program, one, proofs), cache)
-        every.append((found, repeated(found, systems, settings) if found.run else None))
-    return Answers(program, loaded, tuple(every))
 
 
 def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found: Across) -> str:
@@ -95,9 +47,7 @@ def counts(
     every = [] if given is None else [found for found, _ in given.every]
     proved = [found for found in every if found.proved]
     lacks = {
-        "proved of kinder surroundings only": sum(
-            found.around != Surroundings() or found.kinder_timing for found in proved
-        ),
+        "proved of kinder surroundings only": sum(found.kinder for found in proved),
         "resting on unproved claims": sum(
             bool(found.closed(systems, whole.closed).lacks) for found in proved
         ),

@@ -38,6 +38,7 @@ from rcsc.compose.proof.system import (
     read_systems,
 )
 from rcsc.compose.together.left_open import with_those_together
+from rcsc.compose.together.repeated import Answers, answers
 from rcsc.driver.outline import keep_lines
 from rcsc.driver.unchanged import digest_at
 from rcsc.front.commands.shared.options import cores
@@ -177,10 +178,10 @@ def _across(
     settings: TraceSettings,
     cache: Cache | None,
     asked: Asked,
-) -> across.Answers | None:
+) -> Answers | None:
     """Answer the requirements across levels; none where the system states none."""
     try:
-        return across.answers(systems, proof, settings, cache)
+        return answers(systems, proof, settings, cache)
     except OSError as error:
         place = str(error.filename or asked.logs)
         raise UnwritableError(place, error.strerror or "no reason given") from error
@@ -261,7 +262,7 @@ class _More:
 
     findings: Sequence[dict[str, Any]] = ()
     coverages: Mapping[str, Coverage] = field(default_factory=dict)
-    given: across.Answers | None = None
+    given: Answers | None = None
 
 
 def _lines(
