@@ -5,14 +5,18 @@ In: arguments as the user gave them. Out: `Side`s, and pairs of programs.
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Source
 from rcsc.base.host.children import scratch
-from rcsc.lang.model import Program
-from rcsc.lang.project import PROJECT_FILE, Instance, load
+from rcsc.compose.proof.system import NoProgramError
+from rcsc.compose.together.words import levels_read, system_naming
+from rcsc.lang.leaves import spoken_of
+from rcsc.lang.model import BEFORE, Program
+from rcsc.lang.project import PROJECT_FILE, Instance, Loaded, load
 from rcsc.lang.resolve import resolve
 from rcsc.run.description import BadDescription, description, places
 from rcsc.views.diff.revision import NotComparedError, lay_out
@@ -97,17 +101,24 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     levels = _levels(there)
     instances = {root: instance for root, (_, instance) in levels.items() if instance is not None}
     files = tuple(path for path in there if not _is_system(path))
-    loaded = load((*files, *levels), instances=instances) if there else None
+    loaded = load((*files, *levels, *_stated(there)), instances=instances) if there else None
     if loaded is None or (asked.may_lack and not loaded.given):
         return Side(asked.name, {}, (), {})
     programs: dict[str, Program] = {}
     diagnostics = [diagnostic for diagnostic in loaded.diagnostics if diagnostic.severity is Severity.ERROR]
+    unread = ""
     for root in loaded.roots:
-        resolved = resolve(root, loaded)
+        try:
+            resolved = _resolved(root, loaded)
+        except (BadDescription, NoProgramError) as error:
+            unread = str(error)
+            continue
         if isinstance(resolved, Program):
             programs[levels[root][0] if root in levels else _key(root, there)] = resolved
         else:
             diagnostics += resolved
+    if unread and not diagnostics:
+        raise NotComparedError(unread)
     named = {_renamed(name, hidden, shown): source for name, source in loaded.sources.items()}
     sources = {name: Source(name, source.text) for name, source in named.items()}
     return Side(
@@ -116,6 +127,31 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
         tuple(_as_given(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(diagnostics)),
         sources,
     )
+
+
+def _resolved(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
+    """Resolve a root; one that states requirements across levels as the system that names it has it, with the variables that it speaks of.
+
+    Raises:
+        BadDescription, NoProgramError: That system, or a level of it, is not in order.
+    """
+    system = system_naming(root)
+    if system is None:
+        return resolve(root, loaded)
+    resolved = levels_read(system).means(root, loaded)
+    if not isinstance(resolved, Program):
+        return resolved
+    read = {leaf.removeprefix(BEFORE) for one in resolved.stated for leaf in spoken_of(one)}
+    return replace(resolved, variables=tuple(leaf for leaf in resolved.variables if leaf.name in read))
+
+
+def _stated(paths: Sequence[str]) -> Iterator[str]:
+    """Yield the files of requirements across levels of the systems among the paths."""
+    for path in map(Path, filter(_is_system, paths)):
+        with suppress(BadDescription):  # which is told of its levels
+            system = description(path)
+            if system.requirements is not None and system.requirements.is_file():
+                yield os.path.normpath(system.requirements)
 
 
 def _is_system(path: str) -> bool:
