@@ -31,7 +31,7 @@ from rcsc.run.log.required import ACROSS, broken_in
 from rcsc.run.signature import Values
 from tests.across.systems import Running, drawn
 from tests.across.systems import written as written_drawn
-from tests.across.test_across import _COUNTS, Rcsc, _written
+from tests.across.test_across import _BOSS, _COUNTS, Rcsc, _written
 from tests.across.test_across import rcsc as rcsc  # noqa: PLC0414  # the fixture
 
 _PANEL = """\
@@ -218,13 +218,11 @@ def _seen(stood: Mapping[str, Any], took: Mapping[str, Any], held: Mapping[str, 
 
 
 def test_a_log_that_goes_on_is_looked_at_once(tmp_path: Path, rcsc: Rcsc) -> None:
-    held = "requirement held : always not (left.runs and boss.wish = nobody)\n"
-    path = _with_plant(_written(tmp_path, held), "nobody", "l", "l", "nobody", "nobody")
+    path = _with_plant(_written(tmp_path, "property runs : left.runs\n"), "nobody")
     _ran(rcsc, path)
     log = read(tmp_path / ".rcsc-cache" / "two.mcap")
     track = AcrossTrack.of(log, stand(path).across)
-    first = [tick for tick, _, _ in track.further(log)]
-    assert first == list(range(4, 30, 5))
+    assert [tick for tick, _, _ in track.further(log)] == list(range(1, 31))
     assert not list(track.further(log))
 
 
@@ -299,6 +297,15 @@ def test_a_level_that_does_not_run_in_the_tick_of_its_restart_is_as_it_was_until
     path = _with_plant(_compiled(_written(tmp_path, never, files={"left.rcs": slow})), *_WISHES)
     outcome = _played(path, Episode(restarts=(Restart(9, "left"),), ticks=30))
     assert [(one.property, one.tick) for one in outcome.findings] == [(f"{WHERE}: never_back", 11)]
+
+
+def test_what_a_party_gives_stands_in_ticks_in_which_nobody_takes_it(tmp_path: Path) -> None:
+    """`boss` runs in every other tick, and takes what the plant gave in those alone."""
+    slow = _BOSS.replace("period 10", "period 20")
+    stated = "property never_l : panel.wish /= l\nproperty never_takes_l : boss.wish /= l\n"
+    path = _with_plant(_compiled(_written(tmp_path, stated, files={"boss.rcs": slow})), "nobody", "l")
+    outcome = _played(path, Episode(ticks=30))
+    assert [(one.property, one.tick) for one in outcome.findings] == [(f"{WHERE}: never_l", 2)]
 
 
 def test_after_the_plant_broke_what_is_assumed_nothing_across_levels_is_asked_for(tmp_path: Path) -> None:

@@ -248,9 +248,8 @@ class _Reading:
     def _meant(self, operand: _Operand, other: _Operand) -> _Operand:
         """Read a bare word, or a line's number, as the member of the other side that it names."""
         word = operand.text
-        bare = (
-            operand.kind == "bool" and "." not in word and word not in _BOOLS
-        )  # a requirement across levels may be called like it
+        # a requirement across levels may be called like a member
+        bare = operand.kind == "bool" and "." not in word and word not in _BOOLS
         if other.kind == "member" and (bare or operand.kind in {"word", "number"}):
             member = known_name(word, other.members) if other.members else word
             if member is None:
