@@ -6,7 +6,7 @@ restarts levels as `run.adopt` does, publishes what stands outside, and steps mo
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -16,14 +16,15 @@ from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import read_systems
 from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program, Property, earlier
+from rcsc.lang.over_time.past import negation
 from rcsc.lang.over_time.run import Watch
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, description
 from rcsc.run.levels import StateTableError, running_level
 from rcsc.run.system import System, executors, signatures
 
-MOST_TICKS = 6_000
-"""Ticks that are run for one requirement: what is longer stays open."""
+MOST_TICKS, MOST_LISTED = 6_000, 20_000
+"""Ticks that are run for one requirement: what is longer stays open; and where all states are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +238,39 @@ class Running:
                 return 0
             here = after
         return None
+
+    def waits_for_ever(self, stated: Property) -> bool | None:
+        """Return whether some run breaks it, or waits in each tick from some tick on, all of them calm; None if that is not known."""
+        assert stated.monitor is not None
+        watch, names = Watch(stated), [level.name for level in self.system.levels]
+        waits = Watch(replace(stated, condition=negation(stated.monitor.waits)))
+        values, held, admitted, _, tick = self.begins
+        begins: Any = (None, (values, held, admitted, dict(watch.state), tick))
+        seen, here, onward, ran = {begins[0]}, [begins], dict[Any, set[Any]](), 0
+        given = list(product(*(self.inputs[name] for name in names)))
+        while here:
+            key, kept = here.pop()
+            for of, anew in product(given, product((False, True), repeat=len(names))):
+                due = [self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels]
+                if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
+                    continue
+                ran += 1
+                if ran > MOST_LISTED:
+                    return None
+                told = dict(zip(names, of, strict=True)), dict(zip(names, anew, strict=True))
+                found = self._step(kept, *told, watch, stated, {})
+                if found is None:
+                    return True
+                calm = not any(anew) and not any(v == 3 and d for v, d in zip(of, due, strict=True))
+                if calm and self._step(kept, *told, waits, waits.stated, {}) is None:
+                    onward.setdefault(key, set()).add(found[0])
+                if found[0] not in seen:
+                    seen.add(found[0])
+                    here.append(found)
+        while gone := [key for key, targets in onward.items() if not targets & onward.keys()]:
+            for key in gone:
+                del onward[key]
+        return bool(onward)
 
     def walk(
         self, stated: Property, seed: int, ticks: int, *, refuses: bool, restarts: bool, late: bool

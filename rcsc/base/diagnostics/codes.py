@@ -1066,8 +1066,7 @@ class Code(StrEnum):
 
     The file that a system names as `requirements` speaks of the variables of all levels, `LEVEL.VARIABLE`, and of what comes from
     outside, `PARTY.VARIABLE`. It states properties, requirements and assumptions over time, and may name constants, sets and types for
-    them; variables, tables, modules and levels are declared in the tables of a level. Across levels a requirement needs a bound:
-    `within 200 [ms], not drive.moving` or `before CONDITION`, not `eventually`.
+    them; variables, tables, modules and levels are declared in the tables of a level.
     """
     GAP = """RCS401: an input that no line matches
 

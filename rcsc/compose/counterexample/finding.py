@@ -226,7 +226,8 @@ def lap_of(ts: TransitionSystem, finding: Finding) -> list[str]:
     """Spell a lasso: of each of its cycles table and line, with the level's own values that the line tests; repetitions are left out."""
     laps = []
     for tick in finding.ticks[finding.lasso - 1 :]:
-        step = tick[finding.level]
+        if (step := tick.get(finding.level)) is None:
+            continue  # of several levels it need not run in each tick
         seen = seen_by_table(ts, step)
         line = next((line for line in ts.table(step.table).lines if line.name == step.line), None)
         tested = dict.fromkeys(

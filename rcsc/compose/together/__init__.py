@@ -9,6 +9,7 @@ become one transition system, of as few levels as the proof needs, and the engin
 | `words` | what the names in a file of requirements mean |
 | `product` | levels together as one transition system, under one of three timings |
 | `features` | the predicates that invariants may speak of |
+| `eventually` | what comes at no time that is said: bounds, and runs on which it never comes |
 | `proof` | proofs, from few levels to many; what they rest on |
 | `left_open` | what the contract leaves open of a level, asked of it together with those that write to it |
 | `played` | runs of the whole system, as the interpreter does them |

@@ -37,6 +37,8 @@ class _Kept:
     looked: int
     ticks: int
     run_late: tuple[dict[str, int], ...]
+    lasso: int
+    fair: tuple[str, ...]
 
 
 def answered(question: Question, cache: Cache | None) -> Across:
@@ -68,6 +70,8 @@ def recalled(question: Question, cache: Cache) -> Across | None:
         looked=kept.looked,
         vacuous=kept.vacuous,
         assumed=kept.assumed,
+        lasso=kept.lasso,
+        fair=kept.fair,
         stuck=kept.stuck,
         ticks=kept.ticks,
     )
@@ -88,6 +92,8 @@ def _to_keep(found: Across) -> _Kept:
         found.looked,
         len(found.run),
         tuple(map(dict, found.run_late)),
+        found.lasso,
+        found.fair,
     )
 
 

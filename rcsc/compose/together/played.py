@@ -6,16 +6,19 @@ requirement, by its monitor stepped along the run. `rerun` repeats the same on t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import lcm
 
 from rcsc.compose.contract.given import refused
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
 from rcsc.compose.exact.circuit import Circuit
+from rcsc.compose.exact.eventual import Lasso
 from rcsc.compose.exact.explicit import Run
-from rcsc.compose.together.product import Tick, Together
-from rcsc.lang.interpret import Fault, initial
+from rcsc.compose.together.product import NOW, Tick, Together
+from rcsc.lang.interpret import Fault, holds, initial
 from rcsc.lang.leaves import read_by
-from rcsc.lang.model import Property, Value, value_of_key
+from rcsc.lang.model import Expr, Property, Value, VariableName, earlier, value_of_key
+from rcsc.lang.over_time.past import negation
 from rcsc.lang.over_time.run import Watch
 from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic.values import Node
@@ -190,12 +193,10 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
         tick = made.step.cycle if number else made.firsts[run.begins].cycle
         assert isinstance(tick, Tick)
         before = playing.state
-        asked = {name: _asked(ts, tick, name, given, number) for name in ts.members}
-        outside = _told({leaf: tick.after[leaf] for leaf in ts.given}, given)
         late = {end: int(ticks) for end, ticks in _told(tick.late, given).items()}
         if not _never_back(ts, late, ages[-1] if ages else {}):
             return None
-        ticks.append(playing.tick(asked, outside, late))
+        ticks.append(_ticked(playing, tick, given, number))
         ages.append(late)
         after = playing.state
         if any(step.ends_the_run for step in ticks[-1].values()):
@@ -204,6 +205,61 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
             return None
         kept = watch.keeps(before, after)
     return None if kept else PlayedRun(tuple(ticks), _least_late(playing, ticks, ages))
+
+
+def _ticked(playing: Playing, tick: Tick, given: Mapping[str, int], number: int) -> dict[str, CycleRun]:
+    """Run a tick as the circuit says."""
+    asked = {name: _asked(playing.ts, tick, name, given, number) for name in playing.ts.members}
+    outside = _told({leaf: tick.after[leaf] for leaf in playing.ts.given}, given)
+    return playing.tick(asked, outside, {end: int(ticks) for end, ticks in _told(tick.late, given).items()})
+
+
+def played_lasso(
+    ts: Together, made: Circuit, lasso: Lasso, stated: Property, fair: Sequence[Expr]
+) -> PlayedRun | None:
+    """Run a lasso of the circuit, and its loop once more; None where the interpreter does not come round, or a tick of it does not wait.
+
+    Args:
+        ts: The levels, as they are scheduled.
+        made: Their circuit.
+        lasso: Of it.
+        stated: The requirement that waits; no tick of the run breaks it.
+        fair: Conditions each of which has to hold in some tick of the loop.
+    """
+    assert stated.monitor is not None
+    playing, watch = Playing(ts), Watch(stated)
+    waits = Watch(replace(stated, condition=negation(stated.monitor.waits)))
+    environment = [Watch(one) for one in ts.program.environment]
+    ticks, begins, owed = list[Mapping[str, CycleRun]](), lasso.first - 1, list(fair)
+    again = [*lasso.run.given, *lasso.run.given[begins:]]
+    stood = list[State]()
+    for number, given in enumerate(again):
+        at = number if number < len(lasso.run.given) else number - len(lasso.run.given) + begins
+        tick = made.step.cycle if at else made.firsts[lasso.run.begins].cycle
+        assert isinstance(tick, Tick)
+        before = playing.state
+        stood += [_compared(playing, made, waits)] if at == begins else []
+        ran = _ticked(playing, tick, given, number)
+        after = playing.state
+        calm = all(one.fault is not Fault.ADMIT and not one.anew for one in ran.values())
+        kept = [watch.keeps(before, after), not any(one.ends_the_run for one in ran.values())]
+        kept += [one.keeps(before, after) for one in environment]
+        still = not waits.keeps(before, after) and calm
+        if not all(kept) or (number >= begins and not still):
+            return None
+        looked = {**after, **{str(earlier(VariableName(leaf))): value for leaf, value in before.items()}}
+        owed = [one for one in owed if number < begins or not holds(one, looked)]
+        if number < len(lasso.run.given):
+            ticks.append(ran)
+    comes_round = stood[0] == stood[1] == _compared(playing, made, waits)
+    return PlayedRun(tuple(ticks)) if comes_round and not owed else None
+
+
+def _compared(playing: Playing, made: Circuit, waits: Watch) -> State:
+    """Return what the requirement depends on, as the interpreter has it: leaves, states of its monitor, and the place in the schedule."""
+    state = {**playing.state, **waits.state}
+    now = len(playing.left) % lcm(*(playing.ts.periods[name] for name in playing.ts.members))
+    return {leaf: state[leaf] for leaf in made.leaves if leaf in state} | {NOW: now}
 
 
 def _never_back(ts: Together, late: Mapping[str, int], before: Mapping[str, int]) -> bool:

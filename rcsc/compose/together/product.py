@@ -42,12 +42,15 @@ from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, 
 from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import BEFORE, Bool, Int, Kind, Level, OneTable, Program, Property, Scalar, TableName
 from rcsc.lang.operator_table import Op
+from rcsc.lang.over_time.past import FALSE as NEVER
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.run.description import Description
 
 NOW = f"{GHOST}tick"
 """The ghost that counts ticks, as far as periods differ."""
+CALM = f"{GHOST}calm"
+"""The ghost that says that in a tick no level began anew, and none was refused an input; where a requirement speaks of it."""
 LATE = f"{GHOST}late"
 """Of ghosts: by how many ticks a reader last saw a buffer late, and what it held some ticks ago."""
 
@@ -145,6 +148,8 @@ class Together(TransitionSystem):
             self.kinds |= {str(state.name): state.type for state in monitor.states}
         if self._round > 1 and self.timing is not Timing.ANY:
             self.kinds[NOW] = Int(0, self._round - 1)
+        if any(monitor.waits != NEVER for _, monitor in monitors(self.program)):
+            self.kinds[CALM] = Bool()
         for own, source in self.held.items():
             self.kinds[f"{LATE} {source.end}"] = Int(0, self.most_late)
             level, _, leaf = own.partition(".")
@@ -200,6 +205,8 @@ class Together(TransitionSystem):
         start |= {name: values.constant(kind, first[name]) for name, kind in self.given.items()}
         if NOW in self.kinds:
             start[NOW] = values.constant(self.kinds[NOW], 0)
+        if CALM in self.kinds:
+            start[CALM] = TRUE
         for own, source in self.held.items():
             start[f"{LATE} {source.end}"] = values.constant(Int(0, self.most_late), 0)
             start |= {ago(own, ticks): start[own] for ticks in range(1, self.most_late + 1)}
@@ -241,6 +248,9 @@ class Together(TransitionSystem):
         if NOW in self.kinds:
             after[NOW] = self._counted(before[NOW])
         after |= self._ages(before, suffix, late, first=first)
+        if CALM in self.kinds:
+            befalls = (values.either(restarts[name], cycles[name].untaken) for name in cycles)
+            after[CALM] = values.negation(values.any_of(map(values.both, due.values(), befalls)))
         after |= ghosts_after(self.program, before, after, Refusals())
         contract = values.all_of(values.follows(due[name], each.contract) for name, each in cycles.items())
         contract = values.both(contract, self._never_back(before, late))

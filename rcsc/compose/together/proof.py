@@ -26,17 +26,29 @@ from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.contract.watched import can_be_kept
 from rcsc.compose.exact.bounded import looked
 from rcsc.compose.exact.circuit import circuit
+from rcsc.compose.exact.eventual import Waits
 from rcsc.compose.exact.portfolio import helped
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
 from rcsc.compose.invariant.search import LIMITS, FoundInvariant
 from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
+from rcsc.compose.together.eventually import (
+    COMES_TO_AN_END,
+    ROUNDS,
+    bounds,
+    fairness,
+    may_wait,
+    never_waits,
+    waits_for,
+    waits_of,
+    within,
+)
 from rcsc.compose.together.features import features, of_member, unlike
-from rcsc.compose.together.played import PlayedRun, Ticks, plainest
+from rcsc.compose.together.played import PlayedRun, Ticks, plainest, played_lasso
 from rcsc.compose.together.product import Timing, Together, read_by_all, together, writers
 from rcsc.lang.model import Program, Property
-from rcsc.lang.over_time.past import TRUE, negation
+from rcsc.lang.over_time.past import FALSE, TRUE, negation
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.run.description import Description
 
@@ -85,6 +97,8 @@ class Across:
         looked: No run of so many ticks breaks it, where none is shown.
         vacuous: Whether it is proved, too, that nothing ever asks for its response.
         assumed: The assumptions across levels that it may rest on.
+        lasso: The tick of the run, from 1, from which on it waits as at its end, again and again; 0 where the last one breaks it.
+        fair: What is trusted to come at some time, where something is proved to.
         stuck: Whether it is open because what is assumed across levels was not shown to be kept for ever.
         ticks: Of a run that breaks it, where the run itself was not kept.
     """
@@ -102,6 +116,8 @@ class Across:
     looked: int = 0
     vacuous: bool = False
     assumed: tuple[str, ...] = ()
+    lasso: int = 0
+    fair: tuple[str, ...] = ()
     stuck: bool = False
     ticks: int = 0
 
@@ -126,6 +142,7 @@ class Across:
             *refused,
             *(() if self.around.restarts else (NO_RESTART,)),
             *((NEVER_LATE,) if self.kinder_timing else ()),
+            *self.fair,
         )
 
     @property
@@ -182,18 +199,21 @@ class Question:
     def asks(self) -> Across:
         """Answer whether nothing ever asks for its response; what refutes that is a run that does."""
         assert self.stated.monitor is not None
-        never = replace(self.stated, condition=negation(self.stated.monitor.asks))
+        monitor = replace(self.stated.monitor, waits=FALSE)
+        never = replace(self.stated, condition=negation(monitor.asks), monitor=monitor)
         program = replace(self.program, properties=(never,))
         return replace(self, program=program, stated=never).verdict()
 
     def verdict(self) -> Across:
         """Prove it or refute it."""
-        ts = self._together(self.every, Timing.SCHEDULED, EVERY[0])
+        ts = self.together(self.every, Timing.SCHEDULED, EVERY[0])
         assumed = tuple(one.name for one in ts.program.environment)
         stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
         found = Across(
             self.stated, levels=self.every, late=self.system.late_ticks, assumed=assumed, stuck=stuck
         )
+        if may_wait(self.stated):
+            return self._eventually(found)
         left = list[tuple[Surroundings, Timing]]()
         for around in self._surroundings():
             found, broken = self._with_short_runs(found, around)
@@ -202,6 +222,52 @@ class Question:
                 if timing not in broken and self._proved(timing, names, around) is not None:
                     return self._as_proved(self._kindest(found), timing, names, around, "")
         return self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
+
+    def _eventually(self, found: Across) -> Across:
+        """Prove within which bound it comes, or refute it: by a run that a tick breaks, or one on which it waits for ever."""
+        run, known = self._run(EVERY[0], SHORT, Timing.SCHEDULED)
+        if run.ticks:
+            return replace(found, run=run.ticks, broken_in=EVERY[0])
+        found, waits = self._with_lasso(replace(found, looked=known))
+        if found.run:
+            return found
+        rounds = ROUNDS if any(fairness({name: self.systems[name] for name in self.every})) else ()
+        for most, fair in (*((most, False) for most in bounds(waits)), *((most, True) for most in rounds)):
+            for timing, names in self._parts():
+                parties = tuple(fairness({name: self.systems[name] for name in names if fair}))
+                one = self._asking(within(self.stated, most, tuple(condition for _, condition in parties)))
+                if timing is Timing.SCHEDULED and one.proves(names):
+                    told = self._as_proved(
+                        found, timing, names, EVERY[0], waits_for(most, fair=bool(parties))
+                    )
+                    return replace(
+                        told, fair=(COMES_TO_AN_END, *dict.fromkeys(trust for trust, _ in parties))
+                    )
+        return found
+
+    def _with_lasso(self, found: Across) -> tuple[Across, Waits]:
+        """Look for a run on which it waits for ever; return for how long it waits."""
+        ts = self._asking(never_waits(self.stated)).together(self.every, Timing.SCHEDULED, EVERY[0])
+        step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+        made = circuit(ts, firsts, step, obligations(ts, step))
+        waits = waits_of(made)
+        if waits.lasso is not None:
+            fair = [condition for _, condition in fairness(ts.members)]
+            run = played_lasso(ts, made, waits.lasso, self.stated, fair)
+            if run is not None:
+                found = replace(found, run=run.ticks, broken_in=EVERY[0], lasso=waits.lasso.first)
+        return found, waits
+
+    def _asking(self, stated: Property) -> "Question":
+        """Return the same question about another property."""
+        return replace(self, program=replace(self.program, properties=(stated,)), stated=stated)
+
+    def proves(self, names: Sequence[str]) -> bool:
+        """Return whether it is proved of these levels as they are scheduled, whatever befalls them."""
+        every = (False, True) if tuple(names) == self.every else (False,)
+        return any(
+            self._proved(Timing.SCHEDULED, names, EVERY[0], exact=exact) is not None for exact in every
+        )
 
     def _with_short_runs(self, found: Across, around: Surroundings) -> tuple[Across, frozenset[Timing]]:
         """Look for short runs that break it; return the timings under which some run does.
@@ -265,7 +331,7 @@ class Question:
     def _proved(
         self, timing: Timing, names: Sequence[str], around: Surroundings, *, exact: bool = False
     ) -> str | None:
-        return proved(self._together(names, timing, around), tuple(self._lemmas(names, around)), exact=exact)
+        return proved(self.together(names, timing, around), tuple(self._lemmas(names, around)), exact=exact)
 
     def _lemmas(self, names: Iterable[str], around: Surroundings) -> Iterator["Lemma"]:
         """Yield the invariants of these levels, each proved of the level alone, in surroundings that are as hard."""
@@ -323,12 +389,13 @@ class Question:
         """Return the levels of a proof, and an invariant that shows the requirement of them once more."""
         if not found.proved:
             return None
-        ts = self._together(found.levels, found.timing, found.around)
+        ts = self.together(found.levels, found.timing, found.around)
         lemmas = tuple(self._lemmas(found.levels, found.around))
         again = shown(ts, lemmas, exact=bool(found.by))
         return None if again is None else (ts, again)
 
-    def _together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
+    def together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
+        """Return these levels as one transition system."""
         systems = {
             name: ts.refusing() if around.refuses else ts.admitting() for name, ts in self.systems.items()
         }
@@ -339,7 +406,7 @@ class Question:
 
     def _run(self, around: Surroundings, most: int, timing: Timing) -> tuple[PlayedRun, int]:
         """Look for the shortest run of all levels that breaks it, of so many ticks; return it, and how long no run is that does."""
-        ts = self._together(self.every, timing, around)
+        ts = self.together(self.every, timing, around)
         step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
         made = circuit(ts, firsts, step, obligations(ts, step))
         found = looked(made, most)

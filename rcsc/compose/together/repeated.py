@@ -24,10 +24,12 @@ from rcsc.proof.symbolic.values import TRUE
 
 
 def finding_of(found: Across) -> Finding:
-    """Return the run of an answer as a finding of the last level that ran in it."""
+    """Return the run of an answer as a finding of the last level that ran in it; of a loop, in each of its ticks."""
     obligation = Obligation(Sort.REQUIREMENT, "", found.stated.name, TRUE)
-    ran = [name for tick in found.run for name in tick]
-    return Finding(ran[-1], obligation, found.run)
+    ran = [name for tick in found.run[::-1] for name in [*tick][::-1]]
+    loop = found.run[found.lasso - 1 :] if found.lasso else ()
+    tells = next((name for name in ran if all(name in tick for tick in loop)), ran[0])
+    return Finding(tells, obligation, found.run, lasso=found.lasso)
 
 
 def repeated(found: Across, systems: Mapping[str, TransitionSystem], settings: TraceSettings) -> Explanation:

@@ -20,6 +20,8 @@ def said(found: Across, closed: Closed, lacking: str) -> str:
     """
     levels = ", ".join(f"`{name}`" for name in found.levels)
     if not found.proved:
+        if found.refuted and found.lasso:
+            return f"refuted, as scheduled, by a run of {levels} on which it waits for ever"
         if found.refuted:
             how = "with late buffers" if any(found.run_late) else "as scheduled"
             return f"refuted in tick {found.broken_in_tick}, {how}, by a run of {levels}"
@@ -29,7 +31,7 @@ def said(found: Across, closed: Closed, lacking: str) -> str:
     where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
     if closed.lacks:
         return f"rests on {lacking}; given that, proved {where}"
-    return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts_of(closed))}"
+    return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts_of(found, closed))}"
 
 
 def timing_of(found: Across) -> str:
@@ -43,12 +45,10 @@ def timing_of(found: Across) -> str:
             return "as scheduled"
 
 
-def trusts_of(closed: Closed) -> list[str]:
-    """Return what a verdict trusts that people have to know: assumptions, refusals, restarts, buffers in time."""
-    return [
-        *declared(closed.trusts),
-        *(trust for trust in closed.trusts if trust in {NO_RESTART, NEVER_LATE}),
-    ]
+def trusts_of(found: Across, closed: Closed) -> list[str]:
+    """Return what a verdict trusts that people have to know: assumptions, refusals, restarts, buffers in time, what is to come."""
+    own = {NO_RESTART, NEVER_LATE, *found.fair}
+    return [*declared(closed.trusts), *(trust for trust in closed.trusts if trust in own)]
 
 
 def state(found: Across, closed: Closed) -> str:

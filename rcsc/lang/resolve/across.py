@@ -26,7 +26,6 @@ from rcsc.lang.model import (
     Variable,
     VariableName,
 )
-from rcsc.lang.over_time.past import FALSE
 from rcsc.lang.project import Loaded
 from rcsc.lang.resolve.declarations import Names
 from rcsc.lang.resolve.program import closure
@@ -111,12 +110,6 @@ def resolve_across(
     for party, variables in parties.items():
         _declare(scope, party, variables, Span(root, 0, 0))
     every = stated(scope, own)
-    for one in every:
-        if one.monitor is not None and one.monitor.waits != FALSE:
-            message = "what comes eventually is asked of one level; across levels a requirement needs a bound"
-            scope.report(
-                Code.NOT_ACROSS, message, one.span, "say until when: `within TIME,`, or `before CONDITION,`"
-            )
     if scope.diagnostics:
         return _sorted(scope)
     return _program(scope, root, enums, every)

@@ -164,6 +164,7 @@ def _one(
         "vacuous": found.vacuous,
         "looked": found.looked,
         "late_ticks": found.late,
+        "lap": found.lasso,
         "seen_late": [dict(late) for late in found.run_late],
         "time_line": [] if finding is None else [asdict(row) for row in rows(systems, finding)],
         "beside": [] if explanation is None else list(explanation.beside),
