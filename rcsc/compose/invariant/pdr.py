@@ -24,7 +24,7 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Reached, Valuation, Way, Ways
 from rcsc.lang.model import Bool
-from rcsc.proof.solvers.sat import Sat
+from rcsc.proof.solvers.sat import QUESTIONS, Sat
 from rcsc.proof.symbolic.bits import Bits, Literal, Word, key_of_bits
 from rcsc.proof.symbolic.values import Node
 
@@ -46,7 +46,11 @@ class Posed:
     """
 
     def __init__(
-        self, predicates: Sequence[Predicate], cycle: Cycle, obligations: Mapping[int, Node]
+        self,
+        predicates: Sequence[Predicate],
+        cycle: Cycle,
+        obligations: Mapping[int, Node],
+        questions: int = QUESTIONS,
     ) -> None:
         starts = [predicate.node(cycle.before) for predicate in predicates]
         ends = [predicate.node(cycle.after) for predicate in predicates]
@@ -61,7 +65,7 @@ class Posed:
         contract = bits.literal(cycle.contract)
         values = (literal for word in (*self._starts, *self._ends) for literal in word)
         read = (*values, *self.before.values(), *self.after.values(), *self.holds.values())
-        self.sat = Sat([*bits.clauses, [contract]], read)
+        self.sat = Sat([*bits.clauses, [contract]], read, questions=questions)
         self._count = bits.count
 
     @staticmethod

@@ -108,7 +108,7 @@ def search(
         len(chosen): chosen for chosen in (every_predicate(ts, cycle, reads, at) for at in range(CLOSELY + 1))
     }
     rounds = list(by_size.values())
-    tried = [_placed(candidates, chosen) for chosen in rounds]
+    tried = [placed(candidates, chosen) for chosen in rounds]
     needed = max(map(len, tried))  # what the candidates were found with is there from the start
     for chosen, clauses in zip(rounds, tried, strict=True):
         if len(clauses) < needed or len(chosen) < len(invariant.predicates):
@@ -150,7 +150,7 @@ def strengthened(
     return replace(stronger, open=invariant.open, walked=invariant.walked)
 
 
-def _placed(candidates: Iterable[NamedClause], chosen: Sequence[Predicate]) -> list[Clause]:
+def placed(candidates: Iterable[NamedClause], chosen: Sequence[Predicate]) -> list[Clause]:
     """Return the candidates whose predicates are all chosen, and have such values."""
     places = {predicate.name: (at, predicate.size) for at, predicate in enumerate(chosen)}
     clauses = []

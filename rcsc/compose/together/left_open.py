@@ -125,7 +125,7 @@ class _Left:
         step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
         owed = [self._owed(ts, cycle, left) for cycle in (*firsts, step)]
         chosen = features(ts, step, [one.holds for one in owed[-1]])
-        found = searched((*firsts, step), owed, chosen, ())
+        found, _ = searched((*firsts, step), owed, chosen, ())
         for without in (found.open, frozenset(range(len(owed[-1])))):
             wanted = [[one for at, one in enumerate(each) if at not in without] for each in owed]
             with suppress(NotConfirmedError, GaveUpError):

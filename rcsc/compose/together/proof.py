@@ -8,7 +8,8 @@ may do all that its contract allows, so that a proof of few levels is one of all
 levels together, and shown only if the interpreter does it.
 
 1. short runs, by bounded search;
-2. invariants over predicates of all levels, confirmed by Z3; what these leave open goes to the exact engines (`exact.portfolio`);
+2. invariants over predicates of all levels, confirmed by Z3: first of the kindest surroundings, which costs least, then with its clauses of
+   harder ones; what these leave open goes to the exact engines (`exact.portfolio`);
 3. longer runs.
 
 What a level is proved to do alone is taken for granted of every cycle: that it goes on, and that what is read of others is as their
@@ -30,7 +31,7 @@ from rcsc.compose.exact.eventual import Waits
 from rcsc.compose.exact.portfolio import helped
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
-from rcsc.compose.invariant.search import LIMITS, FoundInvariant
+from rcsc.compose.invariant.search import LIMITS, FoundInvariant, placed
 from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
 from rcsc.compose.together.eventually import (
@@ -49,13 +50,15 @@ from rcsc.compose.together.played import PlayedRun, Ticks, plainest, played_lass
 from rcsc.compose.together.product import Timing, Together, read_by_all, together, writers
 from rcsc.lang.model import Program, Property
 from rcsc.lang.over_time.past import FALSE, TRUE, negation
-from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.solvers.sat import QUESTIONS, GaveUpError
 from rcsc.run.description import Description
 
 SHORT, LONG = 8, 60
 """Ticks of the runs that are looked for before a proof is tried, and after it."""
 MOST_STEPS = 10_000_000
 """What Spacer gets for a requirement, in steps: less than 10 s."""
+FEWEST, HARDER = 1_000, 10
+"""How often the SAT solver is asked of harder surroundings, at least, and how many times as often as of the kindest."""
 NO_RESTART = "no level begins anew while the system runs"
 """What is trusted where levels do not begin anew."""
 NEVER_LATE = "no buffer is seen late"
@@ -215,12 +218,13 @@ class Question:
         if may_wait(self.stated):
             return self._eventually(found)
         left = list[tuple[Surroundings, Timing]]()
+        in_kindest = dict[_Part, Shown | None]()
         for around in self._surroundings():
             found, broken = self._with_short_runs(found, around)
             left += [(around, timing) for timing in self._timings if timing not in broken]
-            for timing, names in self._parts():
-                if timing not in broken and self._proved(timing, names, around) is not None:
-                    return self._as_proved(self._kindest(found), timing, names, around, "")
+            for part in self._parts():
+                if part[0] not in broken and self._proved_at_last(in_kindest, part, around):
+                    return self._as_proved(self._kindest(found), *part, around, "")
         return self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
 
     def _eventually(self, found: Across) -> Across:
@@ -266,7 +270,8 @@ class Question:
         """Return whether it is proved of these levels as they are scheduled, whatever befalls them."""
         every = (False, True) if tuple(names) == self.every else (False,)
         return any(
-            self._proved(Timing.SCHEDULED, names, EVERY[0], exact=exact) is not None for exact in every
+            self._proved((Timing.SCHEDULED, tuple(names)), EVERY[0], exact=exact) is not None
+            for exact in every
         )
 
     def _with_short_runs(self, found: Across, around: Surroundings) -> tuple[Across, frozenset[Timing]]:
@@ -299,9 +304,9 @@ class Question:
     def _with_effort(self, found: Across, left: Iterable[tuple[Surroundings, Timing]]) -> Across:
         """Prove it by exact engines, or look for longer runs: each may take long."""
         for around, timing in left:
-            by = self._proved(timing, self._named(), around, exact=True)
-            if by is not None:
-                return self._as_proved(found, timing, self._named(), around, by)
+            shown = self._proved((timing, self._named()), around, exact=True)
+            if shown is not None:
+                return self._as_proved(found, timing, self._named(), around, shown.by)
             if not found.run:
                 run, known = self._run(around, LONG, timing)
                 if run.ticks:
@@ -328,10 +333,29 @@ class Question:
 
     # --- proofs ---
 
+    def _proved_at_last(
+        self, in_kindest: dict["_Part", "Shown | None"], part: "_Part", around: Surroundings
+    ) -> bool:
+        """Return whether it is proved in these surroundings; of what is not in the kindest, which costs least, nothing harder is tried."""
+        kindest = tuple(self._surroundings())[-1]
+        if part not in in_kindest:
+            in_kindest[part] = self._proved(part, kindest)
+        begun = in_kindest[part]
+        return begun is not None and (
+            around == kindest or self._proved(part, around, begun=begun) is not None
+        )
+
     def _proved(
-        self, timing: Timing, names: Sequence[str], around: Surroundings, *, exact: bool = False
-    ) -> str | None:
-        return proved(self.together(names, timing, around), tuple(self._lemmas(names, around)), exact=exact)
+        self,
+        part: "_Part",
+        around: Surroundings,
+        *,
+        exact: bool = False,
+        begun: "Shown | None" = None,
+    ) -> "Shown | None":
+        timing, names = part
+        lemmas = tuple(self._lemmas(names, around))
+        return proved(self.together(names, timing, around), lemmas, exact=exact, begun=begun)
 
     def _lemmas(self, names: Iterable[str], around: Surroundings) -> Iterator["Lemma"]:
         """Yield the invariants of these levels, each proved of the level alone, in surroundings that are as hard."""
@@ -344,7 +368,7 @@ class Question:
         proof = self.proofs.get(name)
         return proof.parts[0] if proof is not None and proof.parts and around.refuses else proof
 
-    def _parts(self) -> Iterator[tuple[Timing, tuple[str, ...]]]:
+    def _parts(self) -> Iterator["_Part"]:
         named = self._named()
         yield Timing.ANY, named
         for timing in self._timings:
@@ -391,7 +415,7 @@ class Question:
             return None
         ts = self.together(found.levels, found.timing, found.around)
         lemmas = tuple(self._lemmas(found.levels, found.around))
-        again = shown(ts, lemmas, exact=bool(found.by))
+        again = proved(ts, lemmas, exact=bool(found.by))
         return None if again is None else (ts, again)
 
     def together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
@@ -424,35 +448,42 @@ class Lemma:
     clauses: tuple[Clause, ...]
 
 
-def proved(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -> str | None:
-    """Prove the requirement of levels together; return how, in words, or None."""
-    found = shown(ts, lemmas, exact=exact)
-    return None if found is None else found.by
-
-
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """An invariant that shows a requirement, as Z3 confirmed it.
+    """An invariant that shows a requirement of levels together, as Z3 confirmed it.
 
     Attributes:
         by: How it was found, in words; empty for the search over predicates.
         exact: Whether it is confirmed only of terms in which all arithmetic of integers is exact.
         known: Those of its clauses that are of a level, which a level's own proof shows: of which level, and where they stand there.
+        asked: How often the SAT solver was asked about a later tick.
     """
 
     invariant: FoundInvariant
     by: str = ""
     exact: bool = False
     known: Mapping[Clause, tuple[str, int]] = field(default_factory=dict)
+    asked: int = 0
 
 
-def shown(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) -> Shown | None:
-    """Find an invariant that shows the requirement of levels together.
+_Part = tuple[Timing, tuple[str, ...]]
+"""A timing, and the levels that are looked at."""
+
+
+def proved(
+    ts: Together,
+    lemmas: Sequence[Lemma] = (),
+    *,
+    exact: bool = False,
+    begun: Shown | None = None,
+) -> Shown | None:
+    """Prove the requirement of levels together; return how, or None.
 
     Args:
         ts: The levels.
         lemmas: What is known of them.
         exact: Whether exact engines try what no invariant over predicates shows.
+        begun: How it was proved in kinder surroundings: its clauses are tried first, and the search is given up where it takes far more.
     """
     step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, step)
@@ -464,7 +495,8 @@ def shown(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) ->
     chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
     of_levels = dict(_clauses(ts, chosen, lemmas))
     held = tuple(of_levels)
-    found, by = searched((*firsts, step), owed, chosen, held), ""
+    found, asked = searched((*firsts, step), owed, chosen, held, begun)
+    by = ""
     if exact:
         more = helped(ts, firsts, step, wanted, found, MOST_STEPS)
         found, by = more.invariant, next(iter(more.by.values()), "")
@@ -473,7 +505,7 @@ def shown(ts: Together, lemmas: Sequence[Lemma] = (), *, exact: bool = False) ->
     for integers in (False, True) if by else (False,):
         with suppress(NotConfirmedError, GaveUpError):
             confirm_owed(found, firsts, step, owed, LIMITS, known=held, exact=integers)
-            return Shown(found, by, integers, of_levels)
+            return Shown(found, by, integers, of_levels, asked)
     return None
 
 
@@ -489,7 +521,7 @@ def goes_on(ts: Together, firsts: Sequence[Cycle], step: Cycle) -> bool:
     if not all(holds.known and holds.low for holds in at_first):
         return False
     chosen = unlike(features(ts, step, [one.holds for one in owed[-1]]))
-    found = searched((*firsts, step), owed, chosen, ())
+    found, _ = searched((*firsts, step), owed, chosen, ())
     if found.open:
         return False
     with suppress(NotConfirmedError, GaveUpError):
@@ -530,19 +562,25 @@ def searched(
     owed: Sequence[Sequence[Obligation]],
     chosen: tuple[Predicate, ...],
     held: tuple[Clause, ...],
-) -> FoundInvariant:
-    """Search an invariant over predicates: of first cycles and a later one, with what each owes, and clauses that are known to hold."""
+    begun: Shown | None = None,
+) -> tuple[FoundInvariant, int]:
+    """Search an invariant over predicates: of first cycles and a later one, with what each owes, and clauses that are known to hold.
+
+    Return it, and how often the solver was asked about a later tick.
+    """
     every = range(len(owed[-1]))
+    candidates = () if begun is None else placed(begun.invariant.named, chosen)
+    most = QUESTIONS if begun is None else max(FEWEST, HARDER * begun.asked)
     posed = [
-        Posed(chosen, cycle, {at: each[at].holds for at in every})
+        Posed(chosen, cycle, {at: each[at].holds for at in every}, most)
         for cycle, each in zip(cycles, owed, strict=True)
     ]
     weights = [2 if one.parts else int(one.size > 2) for one in chosen]
     try:
-        clauses, left = PDR(posed[:-1], posed[-1], Reached.of(()), weights, held).search(every)
+        clauses, left = PDR(posed[:-1], posed[-1], Reached.of(()), weights, held, candidates).search(every)
     except GaveUpError:
-        return FoundInvariant(chosen, held, frozenset(every))
+        return FoundInvariant(chosen, held, frozenset(every)), posed[-1].sat.queries
     finally:
         for cycle in posed:
             cycle.sat.close()
-    return FoundInvariant(chosen, tuple(clauses), frozenset(left))
+    return FoundInvariant(chosen, tuple(clauses), frozenset(left)), posed[-1].sat.queries

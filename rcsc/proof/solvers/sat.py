@@ -50,14 +50,19 @@ class Sat:
     """
 
     def __init__(
-        self, clauses: Iterable[list[int]], read: Iterable[int] = (), conflicts: int = CONFLICTS
+        self,
+        clauses: Iterable[list[int]],
+        read: Iterable[int] = (),
+        conflicts: int = CONFLICTS,
+        questions: int = QUESTIONS,
     ) -> None:
         """Assert the clauses.
 
         Args:
             clauses: Each a list of literals, one of which holds.
             read: All literals that are added, assumed or read later, but new variables; by default any may be.
-            conflicts: The limit of all questions together.
+            conflicts: The limit of all questions together; `questions`, of how often it may be asked.
+            questions: See there.
         """
         from pysat.solvers import Minisat22
 
@@ -65,7 +70,7 @@ class Sat:
         self._solver: Any = Minisat22(bootstrap_with=_simplified(clauses, kept) if kept else clauses)
         self._model: list[int] = []
         self.queries = 0
-        self._conflicts = conflicts
+        self._conflicts, self._questions = conflicts, questions
 
     def add(self, clause: list[int]) -> None:
         """Assert that one of the literals holds."""
@@ -75,11 +80,11 @@ class Sat:
         """Return whether all that is asserted can hold together with these literals.
 
         Raises:
-            GaveUpError: After `BUDGET` conflicts; after `QUESTIONS` questions, or so many conflicts in all as it may have.
+            GaveUpError: After `BUDGET` conflicts; after so many questions, or conflicts in all, as it may have.
         """
         self.queries += 1
         left = self._conflicts - self._solver.accum_stats()["conflicts"]
-        if self.queries > QUESTIONS or left <= 0:
+        if self.queries > self._questions or left <= 0:
             raise GaveUpError
         self._solver.conf_budget(min(BUDGET, left))
         try:
