@@ -86,6 +86,12 @@ def test_what_a_proof_needs_is_told_by_level_and_its_loss_breaks_it(hands: Path)
 def test_nothing_is_known_of_what_rests_on_an_assumption_or_is_refuted(tmp_path: Path) -> None:
     path = _written(tmp_path, f"{HANDS}assume calm assumed : never panel.wish = r\n")
     assert [core_across(each, each.answer()).uses for each in questions(path)] == [None] * 3
+    path = _written(
+        tmp_path, "requirement some_time : when left.runs, eventually not left.runs or boss.go_left\n"
+    )
+    assert [(each.answer().proved, core_across(each, each.answer()).uses) for each in questions(path)] == [
+        (True, None)
+    ]
     path = _written(tmp_path, "requirement at_once : whenever boss.go_left, at once left.runs\n")
     assert [core_across(each, each.answer()).uses for each in questions(path)] == [None]
 

@@ -17,6 +17,7 @@ from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.coverage.parts import How, Switched, Use, switched, uses_of
 from rcsc.compose.coverage.questions import Frame, Member, Questions, needed, with_program
 from rcsc.compose.invariant.cubes import held
+from rcsc.compose.together.eventually import may_wait
 from rcsc.compose.together.product import Tick, Together
 from rcsc.compose.together.proof import Across, Question, Shown
 from rcsc.proof.solvers import smt
@@ -45,9 +46,10 @@ class AcrossCore:
 
 
 def core_across(question: Question, found: Across) -> AcrossCore:
-    """Return what a requirement needs: nothing is known of one that is not proved, or that rests on assumptions across levels."""
+    """Return what a requirement needs; nothing is known of one that is not proved, waits without a bound, or rests on what is assumed."""
     unknown = AcrossCore(found.stated.name, None)
-    if not found.proved or found.assumed:  # what lets them be kept is no goal here
+    # What lets assumptions be kept is no goal here; nor is the bound within which something comes.
+    if not found.proved or found.assumed or may_wait(found.stated):
         return unknown
     with smt.together(STEPS):
         uses = _needed(question, found)
