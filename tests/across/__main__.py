@@ -2,7 +2,8 @@
 
 Seeds are numbers: those from `--seed` on, `--count` of them. Of each the requirements across levels are answered and judged by running
 the levels, with buffers that are never late, a tick late, and two, in turn; so is what comes eventually, and what is proved of levels
-together of what their contracts leave open. Prints the verdicts, counted, and each difference with its seed, also where Ctrl-C ends it.
+together of what their contracts leave open, and what is found of plain outputs. Prints the verdicts, counted, and each difference with
+its seed, also where Ctrl-C ends it.
 
 `--mutants` makes slips in each drawn system instead, each alone: a wire that is cut, two that are swapped, an output that comes back to
 nobody, a period twice as long. A requirement that is proved of the system has to be refuted of such a mutant by a run, or proved of it,
@@ -22,13 +23,14 @@ from pathlib import Path
 
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
 from rcsc.compose.together.proof import Across, Question
-from tests.across import test_eventually, test_judged, test_left_open
+from tests.across import test_eventually, test_judged, test_left_open, test_plain
 from tests.across.systems import Drawn, Running, drawn, written
 
 KINDS: dict[str, Callable[[int, Path], list[str]]] = {
     "required": lambda seed, folder: test_judged.judged(seed, folder, late=seed % 3),
     "comes": test_eventually.judged,
     "left open": lambda seed, folder: test_left_open.judged(seed, folder, late=seed % 3),
+    "plain": test_plain.judged,
 }
 
 

@@ -76,10 +76,12 @@ def _owed(writer: str, every: Mapping[str, Links], given: Mapping[str, tuple[Giv
         for fact in facts:
             end = every[reader].written_as(fact.record)
             if end is not None and end[1] == writer:
-                yield Owed(f"{reader}.{fact.name}", _at_the_writer(fact.condition, end[0], end[2]))
+                yield Owed(f"{reader}.{fact.name}", at_the_writer(fact.condition, end[0], end[2]))
 
 
-def _at_the_writer(condition: Expr, record: str, output: str) -> Expr:
+def at_the_writer(condition: Expr, record: str, output: str) -> Expr:
+    """Return a condition on an input as one on the output that a buffer fills it with."""
+
     def other(name: VariableName) -> VariableName:
         return VariableName(output + name.removeprefix(record)) if is_part(name, record) else name
 

@@ -11,6 +11,7 @@ become one transition system, of as few levels as the proof needs, and the engin
 | `features` | the predicates that invariants may speak of |
 | `eventually` | what comes at no time that is said: bounds, and runs on which it never comes |
 | `proof` | proofs, from few levels to many; what they rest on |
+| `plain` | what a level keeps of outputs without a protocol, found for who reads them, under any timing |
 | `left_open` | what the contract leaves open of a level, asked of it together with those that write to it |
 | `played` | runs of the whole system, as the interpreter does them |
 | `kept` | verdicts that an earlier run found |

@@ -38,6 +38,7 @@ from rcsc.compose.proof.system import (
     read_systems,
 )
 from rcsc.compose.together.left_open import with_those_together
+from rcsc.compose.together.plain import with_what_is_kept
 from rcsc.compose.together.repeated import Answers, answers
 from rcsc.driver.outline import keep_lines
 from rcsc.driver.unchanged import digest_at
@@ -125,6 +126,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     with _LevelProgress(names, wanted=asked.progress) as done:
         jobs = asked.jobs or (cores() if large else 1)
         proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
+    if not asked.only and not asked.variants:
+        systems, proof = with_what_is_kept(systems, proof, effort, cache)
     if asked.certificate is not None:
         _write(asked.certificate, systems, proof)
     alone, given = proof, None
