@@ -38,15 +38,25 @@ def repeated(found: Across, systems: Mapping[str, TransitionSystem], settings: T
     Raises:
         OSError: It cannot be kept there.
     """
-    finding = finding_of(found)
+    return again(finding_of(found), found.stated.name, systems, settings)
+
+
+def again(
+    finding: Finding, name: str, systems: Mapping[str, TransitionSystem], settings: TraceSettings
+) -> Explanation:
+    """Repeat a run on executors of its levels; keep it as a log of this name where `settings` says so.
+
+    Raises:
+        OSError: It cannot be kept there.
+    """
     explanation = Explanation(finding.level, finding.obligation, finding)
     if not runs_on_executors(systems, finding):
         return explanation
     with scratch("across") as temporary:
         folder = temporary if settings.log is None else settings.log
         system = replace(settings.system, generated=folder / "generated")
-        make((systems[name].program for name in finding.levels), system.generated, altered=settings.altered)
-        log = None if settings.log is None else folder / f"{found.stated.name}.mcap"
+        make((systems[level].program for level in finding.levels), system.generated, altered=settings.altered)
+        log = None if settings.log is None else folder / f"{name}.mcap"
         try:
             record(finding, systems, system, log, altered=settings.altered)
         except ExecutorsDifferError as error:

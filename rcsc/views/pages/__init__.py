@@ -22,5 +22,6 @@ Any system has these; a plant may add what is true of it alone (`Staged.witness`
 copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
 
 Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `data` says
-who knows the world outside and draws it; `witness` watches a run, `log_page` reads one; `report` and `finding_page` are pages.
+who knows the world outside and draws it; `witness` watches a run, `log_page` reads one; `report`, `finding_page` and
+`requirement_page` are pages.
 """

@@ -73,22 +73,37 @@ def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, 
 
 def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> str:
     """Return the page; arguments are as in `trace`."""
-    ticks = [_tick(frame, log, finding, cell) for frame in frames(log)]
     return PAGES.get_template("trace.html.jinja").render(
         finding=finding,
-        ticks=[(isinstance(tick, Alike), tick) for tick in folded(ticks)],
+        ticks=film_of(log, finding, cell),
         notes=_notes(log, finding),
         cell=about_cell(cell, why_not),
-        sign=_SIGNS,
+        sign=SIGNS,
     )
 
 
-_SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
+def film_of(
+    log: Log, finding: LoggedFinding, cell: DrawnCell | None = None, *, asks: bool = False
+) -> "list[tuple[bool, _Tick | Alike[_Tick]]]":
+    """Return the ticks of a run as the template of a filmstrip takes them: whether it stands for several alike, and the tick.
+
+    Where a run `asks`, it breaks nothing: what is a finding's tick is that in which it asks.
+    """
+    ticks = [_tick(frame, log, finding, cell, asks=asks) for frame in frames(log)]
+    return [(isinstance(tick, Alike), tick) for tick in folded(ticks)]
 
 
-def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell | None) -> _Tick:
-    broken = frame.tick == finding.broken_at
-    mark = "broken here" if broken else "what comes of it" if frame.tick > finding.broken_at else ""
+SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
+
+
+def _tick(
+    frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell | None, *, asks: bool
+) -> _Tick:
+    there = frame.tick == finding.broken_at
+    mark = "what comes of it" if frame.tick > finding.broken_at else ""
+    if there:
+        mark = "it asks" if asks else "broken here"
+    broken = there and not asks
     drawn = None if cell is None else cell.drawn(frame.tick)
     return _Tick(frame, frame.tick * log.tick_ms, mark, broken, drawn)
 

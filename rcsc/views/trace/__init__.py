@@ -15,5 +15,6 @@ Trusted: what the templates and the emitter say of their lines. Whether the code
 
 Modules: `matrix` (all of one program), `across` (requirements across levels, by the lines that reach them),
 `requirements` (their standing; against a list), `tables_of` (CSV and JSON), `kept` (a kept matrix against this one), `page`
-(HTML), `answer` (one question), `collect` (all of it, for the command, with what is proved), `names` (the data dictionary).
+(HTML), `story` (one requirement, for a page of its own), `answer` (one question), `collect` (all of it, for the command, with what is
+proved), `names` (the data dictionary).
 """

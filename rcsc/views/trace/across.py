@@ -1,7 +1,7 @@
 """Requirements across levels, traced: to the lines whose writes reach what they name, through whatever buffers, and back.
 
-In: a system, read. Out: for each requirement the lines that have a part in it, each with how. It follows who writes what from which values;
-a line that is not among them can write what it likes, and the requirement stands as it stood.
+In: a system, read. Out: for each requirement the lines that have a part in it, each with how. It follows who writes what from which values:
+what other lines write does not reach what it names.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -49,10 +49,12 @@ class _Flow:
     writes: frozenset[str]
 
 
-def parts_of(its: Read, stated: Property) -> tuple[Part, ...]:
-    """Return every line that has a part in a requirement across levels: those that change or test what it names first."""
+def parts_of(its: Read, stated: Property, of: str = "") -> tuple[Part, ...]:
+    """Return every line that has a part in a requirement across levels, or of one: those that change or test what it names first."""
     flows = {level: tuple(_flows(program, level)) for level, (program, _) in its.programs.items()}
     named = {level: _named(its, level, stated) for level in flows}
+    if of:
+        named = {level: set(reads(stated)) if level == of else set[str]() for level in flows}
     inside = _reached(its, flows, named)
     found = [
         Part(level, flow.table, flow.line, how, direct)

@@ -3,27 +3,36 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from rcsc.base.diagnostics.codes import Code
+from rcsc.base.host.cache import Cache
 from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings
-from rcsc.compose.counterexample.finding import rows
+from rcsc.compose.counterexample.finding import Finding, rows
 from rcsc.compose.coverage.covered import Coverage
 from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.together.kept import answered
 from rcsc.compose.together.needed import core_across
 from rcsc.compose.together.proof import Across, Question
-from rcsc.compose.together.repeated import Answers, finding_of
+from rcsc.compose.together.repeated import Answers, again, finding_of, repeated
 from rcsc.compose.together.said import said, state
 from rcsc.compose.together.words import stated_across
+from rcsc.driver.requirements import Read
 from rcsc.front.commands.shared.proved import named
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.systems.explained import say_exercise, say_run
+from rcsc.lang.model import Property
+from rcsc.lang.over_time.past import TRUE
+
+if TYPE_CHECKING:
+    from rcsc.views.pages.requirement_page import RequirementStory
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
+_NOT_REPEATED = "A run was found, and is of no executors: `rcsc prove` prints it."
 _FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
 
 
@@ -135,6 +144,44 @@ def covered(
         level: replace(one, across=tuple((core.name, core.of(level)) for core in cores))
         for level, one in coverages.items()
     }
+
+
+def story(
+    its: Read, whole: SystemProof, stated: Property, settings: TraceSettings, cache: Cache | None
+) -> "tuple[RequirementStory, Path | None]":
+    """Return all that is known of a requirement across levels, and the log of a run that breaks it, or that asks for its response."""
+    from rcsc.views.trace.story import across_story  # few make a page
+
+    assert its.across is not None
+    proofs = {proof.level: proof for proof in whole.levels}
+    question = Question(its.systems, its.described, its.across[0], stated, proofs)
+    found = answered(question, cache)
+    told = across_story(its, whole, found)
+    if not found.proved:
+        if not found.run:
+            return replace(told, without="No run was found that breaks it; a longer one may."), None
+        explanation = repeated(found, its.systems, settings)
+        return (told, explanation.log) if explanation.log else (replace(told, without=_NOT_REPEATED), None)
+    always = stated.monitor is None or stated.monitor.asks == TRUE
+    asking = None if always or found.vacuous else question.asks()
+    finding = finding_of(asking) if asking is not None and asking.run else None
+    return with_exercise(told, stated, finding, its.systems, settings)
+
+
+def with_exercise(
+    told: "RequirementStory",
+    stated: Property,
+    finding: Finding | None,
+    systems: Mapping[str, TransitionSystem],
+    settings: TraceSettings,
+) -> "tuple[RequirementStory, Path | None]":
+    """Return what is told of a proved requirement, with the log of a run that asks for its response; with why not, where there is none."""
+    if stated.monitor is None or stated.monitor.asks == TRUE:
+        return replace(told, without="It is about every cycle: any run is one of it."), None
+    if finding is None:
+        return replace(told, without="No run was found that asks for its response."), None
+    log = again(finding, stated.name, systems, settings).log
+    return (replace(told, asks=True), log) if log else (replace(told, without=_NOT_REPEATED), None)
 
 
 def as_json(

@@ -25,6 +25,7 @@ Examples:
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
   rcsc prove --export aiger questions          each level and what it owes, for another model checker
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
+  rcsc prove --show calm --report calm.html    all that is known of a requirement, as a page
   rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
   rcsc prove --level task --coverage           what requirements speak of, and what none would notice
   rcsc prove --where "stock = 0"               traces that begin with an empty stock
@@ -63,6 +64,9 @@ Examples:
               help="Write each level, exact, and what it owes to DIR for another model checker, and prove nothing.")  # fmt: skip
 @click.option("--show", "shows", multiple=True, metavar="NAME",
               help="Print a run that asks for the response of the requirement over time NAME, and prove nothing (repeatable).")  # fmt: skip
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="PAGE",
+              help="With --show NAME: prove the levels, and write a page about that requirement, to be handed on: its verdict, what it "
+              "rests on and trusts, the lines that have a part in it, a run; one file that needs nothing else.")  # fmt: skip
 @click.option("--coverage", is_flag=True,
               help="Print, too, what each property and requirement needs, and what can be left out unnoticed.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
@@ -77,7 +81,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None, shows: tuple[str, ...],
-    coverage: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
+    report: Path | None, coverage: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -85,8 +89,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     answer of the database. What it assumes of a neighbour is proved of that neighbour. Printed: each
     assumption with its new standing, what is guaranteed between levels, and for what fails the shortest run that shows it.
     """
-    for extra in (*(["certify"] if confirms else []), *(["log"] if logs else [])):
+    for extra in (*(["certify"] if confirms else []), *(["log"] if logs or report else [])):
         need(extra)
+    if report is not None and len(shows) != 1:
+        raise click.UsageError("--report is of one requirement: `--show NAME` says which")
     path = None if cases else system_path(system)
     rules = {
         "without-deferral": without_deferral,
@@ -113,6 +119,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     from rcsc.front.commands.systems.proving import (  # what is known is printed without
         Asked,
         exported,
+        paged,
         proved,
         run_cases,
         shown_by_runs,
@@ -122,6 +129,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         return run_cases(cases)
     if exports is not None:
         return exported(path, only, *exports)
+    if report is not None:
+        return paged(path, shows[0], report, cycles, cache)
     if shows:
         return shown_by_runs(path, shows, cycles)
     asked = Asked(

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +13,7 @@ from rcsc.base.diagnostics.jsonform import diagnostic_to_json
 from rcsc.base.diagnostics.render import full, paint, plain
 from rcsc.base.diagnostics.source import Sources
 from rcsc.base.host.cache import Cache
+from rcsc.base.host.children import scratch
 from rcsc.base.host.files import write_atomically
 from rcsc.compose.contract.beginning import BadStartError, Starts, starts
 from rcsc.compose.contract.claims import CONTRACT, Key
@@ -41,6 +42,7 @@ from rcsc.compose.together.left_open import with_those_together
 from rcsc.compose.together.plain import with_what_is_kept
 from rcsc.compose.together.repeated import Answers, answers
 from rcsc.driver.outline import keep_lines
+from rcsc.driver.requirements import Read
 from rcsc.driver.unchanged import digest_at
 from rcsc.front.commands.shared.options import cores
 from rcsc.front.commands.shared.proved import (
@@ -64,9 +66,13 @@ from rcsc.front.commands.shared.stopped import say_error
 from rcsc.front.commands.systems import across
 from rcsc.front.commands.systems.covering import coverage_as_json, lines_of
 from rcsc.front.commands.systems.explained import explanation_as_json, say_exercise, say_explanation
-from rcsc.lang.model import Kind
+from rcsc.lang.model import Kind, Property
+from rcsc.lang.over_time.past import TRUE as ALWAYS
 from rcsc.proof.solvers.options import Limits
 from rcsc.run.description import Description, description
+
+if TYPE_CHECKING:
+    from rcsc.views.pages.requirement_page import RequirementStory
 
 ACROSS = "requirements across levels"
 """What the files of these are kept under, among those of the levels' programs, none of which has a blank in its name."""
@@ -218,6 +224,84 @@ def shown_by_runs(path: Path, names: tuple[str, ...], length: int | None) -> int
             else:
                 say_exercise(systems, finding, f"`{stated.name}` of level `{finding.level}`")
     return status
+
+
+def paged(path: Path, name: str, page: Path, length: int | None, cache: Cache | None) -> int:
+    """Write a page about the requirement or property `NAME`, or `LEVEL.NAME`; return 1 where it is not proved."""
+    from rcsc.driver.requirements import read
+    from rcsc.run.log.read import read as read_log  # of an extra
+    from rcsc.views.pages.requirement_page import write_requirement
+
+    systems = read_systems(path)[0]
+    its = replace(read(path, cache), systems=systems)
+    whole = prove_transition_systems(systems, None, 1, tuple(systems), None, cache)
+    usual = usual_length(systems.values()) if length is None else length
+    try:
+        with scratch("page") as folder:
+            settings = TraceSettings(its.described, usual, log=folder)
+            story, log = _story(its, whole, name, settings, cache)
+            write_requirement(page, story, None if log is None else read_log(log))
+    except OSError as error:
+        raise UnwritableError(str(page), error.strerror or "no reason given") from error
+    click.echo(f"{story.word} `{story.name}` {story.whose}: {story.verdict}")
+    click.echo(f"page: {page}")
+    return 0 if story.state == "proved" else 1
+
+
+def _story(
+    its: Read, whole: SystemProof, name: str, settings: TraceSettings, cache: Cache | None
+) -> "tuple[RequirementStory, Path | None]":
+    """Return what is known of a requirement, and the log of a run of it.
+
+    Raises:
+        click.UsageError: Nothing is called so, or several are.
+    """
+    across_ = [] if its.across is None else [one for one in its.across[0].properties if one.name == name]
+    level, _, plain = name.rpartition(".")
+    own = [
+        (owner, stated)
+        for owner, ts in its.systems.items()
+        for stated in ts.program.properties
+        if stated.name == plain and level in {"", owner} and not stated.standard
+    ]
+    if not across_ and not own:
+        raise click.UsageError(f"no level, and nothing across levels, has a requirement `{name}`")
+    if len(across_) + len(own) > 1:
+        owners = [*("across levels" for _ in across_), *(f"`{owner}.{plain}`" for owner, _ in own)]
+        raise click.UsageError(f"several are called `{name}`: {', '.join(owners)}")
+    if across_:
+        return across.story(its, whole, across_[0], settings, cache)
+    return _story_of_level(its, whole, *own[0], settings)
+
+
+def _story_of_level(
+    its: Read, whole: SystemProof, level: str, stated: Property, settings: TraceSettings
+) -> "tuple[RequirementStory, Path | None]":
+    from rcsc.views.trace.story import level_story
+
+    key = (stated.word, "", stated.name)
+    accepted = whole.of(level, key).accepted
+    broken = None if accepted else _explained(its, whole, level, key, settings)
+    story = level_story(its, whole, level, stated, refuted=broken is not None and broken.finding is not None)
+    if not accepted:
+        log = None if broken is None else broken.log
+        return (
+            (story, log)
+            if log is not None
+            else (replace(story, without="No run was found that breaks it."), None)
+        )
+    always = stated.monitor is None or stated.monitor.asks == ALWAYS
+    finding = None if always else exercising(its.systems[level], stated, settings)
+    return across.with_exercise(story, stated, finding, its.systems, settings)
+
+
+def _explained(
+    its: Read, whole: SystemProof, level: str, key: Key, settings: TraceSettings
+) -> Explanation | None:
+    """Return the explanation of one claim of a level that is not proved."""
+    alone = replace(whole, levels=tuple(proof for proof in whole.levels if proof.level == level))
+    every = explain(its.systems, alone, settings)
+    return next((one for one in every if one.obligation.key == key), None)
 
 
 def exported(path: Path, only: tuple[str, ...], form: str, folder: Path) -> int:
