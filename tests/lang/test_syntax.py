@@ -563,6 +563,25 @@ def spans(node: object) -> object:
     return tuple(spans(getattr(node, name)) for name in slots)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "assume a : (when(again))\n",
+        "assume a : when and b\n",
+        "invariant a : when(again)\n",
+        "property a : b for (-n + 5)\n",
+        "property a : b for (-3) cycles\n",
+        "property a : once (when.a)\n",
+        "property a : once whenever\n",
+    ],
+)
+def test_words_of_requirements_are_names_where_they_stand_as_one(text: str) -> None:
+    """Parentheses stand where the words, or a sign after `for`, would be read otherwise, and nowhere else."""
+    parsed = parse(Source("a.rcs", text))
+    assert isinstance(parsed, tree.File), text
+    assert format_file(parsed) == text
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.lists(expressions(), min_size=2, max_size=5, unique_by=spell_expr), st.booleans())
 def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.Expr], again: bool) -> None:
@@ -570,19 +589,19 @@ def test_conditions_joined_by_and_are_what_the_whole_cell_says(parts: list[tree.
     first = "| 0 | " + " and ".join(spell_expr(part) for part in reversed(parts)) + " ||\n" if again else ""
     text = f"table t {{\n| line | when ||\n|---|---||\n{first}| 1 | {cell} ||\n}}\n"
     parsed = parse(Source("a.rcs", text))
-    whole = parse(Source("b.rcs", f"assume a : {cell}\n"))
+    whole = parse(Source("b.rcs", f"invariant a : {cell}\n"))
     if not isinstance(parsed, tree.File) or not isinstance(whole, tree.File):
         assert type(parsed) is type(whole)
         return
-    [table], [assumed] = parsed.declarations, whole.declarations
+    [table], [claimed] = parsed.declarations, whole.declarations
     assert isinstance(table, tree.TableDecl)
-    assert isinstance(assumed, tree.AssumeDecl)
+    assert isinstance(claimed, tree.InvariantDecl)
     [condition] = table.rows[-1].conditions
     assert isinstance(condition, tree.Comparison)
-    assert condition.value == assumed.condition
-    begin = len("assume a : ")
+    assert condition.value == claimed.condition
+    begin = len("invariant a : ")
     written = [list(flat(spans(part))) for part in joined(condition.value, len(condition.places) or 1)]
-    alone = [list(flat(spans(part))) for part in joined(assumed.condition, len(condition.places) or 1)]
+    alone = [list(flat(spans(part))) for part in joined(claimed.condition, len(condition.places) or 1)]
     for (start, _), here, there in zip(condition.places or [(0, 0)], written, alone, strict=True):
         moved = [(begin + start + span.start, begin + start + span.end) for span in here]
         assert moved == [(span.start, span.end) if span.file else (begin + start,) * 2 for span in there]

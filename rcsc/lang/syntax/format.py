@@ -9,6 +9,7 @@ from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.layout import WIDTH, table_rows
 from rcsc.lang.syntax.spell import (
+    spell_claimed,
     spell_expr,
     spell_field,
     spell_req,
@@ -104,7 +105,8 @@ def _type(one: tree.UnitDecl | tree.ConstDecl | tree.SetDecl | tree.EnumDecl | t
 
 
 def _claim(claim: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
-    condition, req = spell_expr(claim.condition), spell_req(claim)
+    spell = spell_claimed if isinstance(claim, tree.AssumeDecl) else spell_expr
+    condition, req = spell(claim.condition), spell_req(claim)
     match claim:
         case tree.AssumeDecl(name, _, state):
             return f"assume {name.text}{f' {state}' if state else ''}{req} : {condition}"

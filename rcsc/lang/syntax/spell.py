@@ -1,5 +1,6 @@
 """Expressions, types and conditions as text, with no more parentheses than are needed."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator
 from typing import assert_never
 
@@ -33,6 +34,22 @@ _AFTER_A_SCOPE = frozenset(
     "when whenever at on off only next always never eventually within for exactly until before".split()
 )
 """Words that would make a scope of `before c,`; a response that begins with a variable called so stands in parentheses."""
+
+
+_AFTER_ONCE = frozenset("and or xor implies in not mod when for since then until upon".split())
+"""Words after which a name `once` looks back at nothing (`ONCE` of the grammar)."""
+_BEFORE_BRACKETS = frozenset(
+    "while unless before after between from only when whenever next always never eventually within for exactly until".split()
+)
+"""Words that begin a requirement over time before brackets (`_OVER_TIME` of the grammar)."""
+_WORD = re.compile(r"\w*", re.ASCII)
+
+
+def spell_claimed(condition: tree.Expr) -> str:
+    """Return what is assumed of a cycle; in parentheses where it would be read as an assumption over time."""
+    text = spell_expr(condition)
+    word, brackets, _ = text.partition("(")
+    return f"({text})" if brackets and word in _BEFORE_BRACKETS else text
 
 
 def spell_required(one: tree.RequirementDecl) -> str:
@@ -91,7 +108,7 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
         case tree.Unary("not", operand):
             return f"not {spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))}", NEGATION
         case tree.Once(operand):
-            return f"once {spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))}", NEGATION
+            return f"once {_remembered(operand)}", NEGATION
         case tree.Since(left, right):
             return f"{spell_expr(left, NEGATION)} since {spell_expr(right, NEGATION)}", CONJUNCTION
         case tree.Unary(_, operand):
@@ -181,8 +198,16 @@ def spell_member(member: tree.Member) -> str:
     return spell_expr(member)
 
 
+def _remembered(operand: tree.Expr) -> str:
+    """Return what `once` looks for; in parentheses where it begins with a variable that is called as a word that may follow one."""
+    text = spell_expr(operand, NEGATION + isinstance(operand, tree.Lasts))
+    return f"({text})" if _WORD.match(text)[0] in _AFTER_ONCE else text  # type: ignore[index]  # it matches nothing, too
+
+
 def _for(time: tree.Time) -> str:
-    return f"for {_time(time)}"
+    """Return for how long; in parentheses where a sign would begin it."""
+    value = spell_expr(time.value, SUM)
+    return f"for {f'({value})' if value.startswith('-') else value}{' cycles' * time.cycles}"
 
 
 def _time(time: tree.Time) -> str:

@@ -11,7 +11,7 @@ export function mount(root, bus) {
   const names = make("div", { class: "names" });
   const slider = make("div", { class: "line", role: "slider", tabindex: "0", "aria-label": "Tick" }, canvas);
   const readout = make("output", { class: "grow readout" });
-  const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find: level.leaf = value, or not level.requirement", spellcheck: "false", list: "run-words" });
+  const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find: level.leaf = value, not NAME", spellcheck: "false", list: "run-words" });
   const finds = bus.answers("time.find");
   const bar = make("div", { class: "bar" });
   root.append(bar, make("div", { class: "tracks scroll" }, names, slider));
