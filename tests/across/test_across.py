@@ -192,6 +192,74 @@ def test_what_only_a_restart_breaks_is_proved_trusting_that_none_comes(tmp_path:
     assert found.trusts({}) == (NO_RESTART,)
 
 
+_ORDERS = "record order {\n  inc_command : int 0 .. 65535\n}\n"
+_GIVES = """\
+use orders
+input go : bool
+output to_hand : order
+table give {
+  | line | go    || to_hand.inc_command                 |
+  |------|-------||-------------------------------------|
+  | more | true  || (to_hand.inc_command + 1) mod 65536 |
+  | same | false || to_hand.inc_command                 |
+}
+level boss { period 10 [ms] table give }
+"""
+_TAKES = """\
+use orders
+input command : order
+state inc_command_seen : int 0 .. 65535
+state fresh : bool restart true
+output both : bool safe false
+table take {
+  | line | command.inc_command = inc_command_seen | fresh || both  | fresh | inc_command_seen    |
+  |------|----------------------------------------|-------||-------|-------|---------------------|
+  | new  | false                                  | true  || true  | false | command.inc_command |
+  | take | false                                  | false || false | false | command.inc_command |
+  | same | true                                   |       || false | false | inc_command_seen    |
+}
+level hand { period PERIOD [ms] table take }
+"""
+_ORDERED = """\
+name = "ordered"
+generated = "generated"
+tick_ms = 10
+requirements = "all.rcs"
+[[level]]
+name = "boss"
+[[level]]
+name = "hand"
+[buffers]
+"boss.to_hand" = "hand.command"
+"panel.go" = "boss.go"
+"""
+
+
+@pytest.mark.parametrize("period", [10, 20, 30])
+def test_a_level_may_begin_anew_in_a_tick_in_which_it_does_not_run(tmp_path: Path, period: int) -> None:
+    """What it found in its buffers then is what counts as seen, and an order that came before its next cycle is new."""
+    for name, text in {
+        "orders.rcs": _ORDERS,
+        "boss.rcs": _GIVES,
+        "hand.rcs": _TAKES.replace("PERIOD", str(period)),
+        "all.rcs": "requirement seen : never hand.both\n",
+        "system.toml": _ORDERED,
+        "rcsc.toml": 'name = "ordered"\n',
+    }.items():
+        (tmp_path / name).write_text(text)
+    path = tmp_path / "system.toml"
+    systems, _ = read_systems(path)
+    stated = stated_across(description(path), {name: ts.program for name, ts in systems.items()})
+    assert stated is not None
+    found = Question(systems, description(path), stated[0], stated[0].properties[0]).answer()
+    assert found.proved
+    assert found.around.restarts is (period == 10)
+    assert len(found.run) == {10: 0, 20: 3, 30: 4}[period]
+    if found.run:
+        assert found.run[-1]["hand"].anew
+        assert not repeated(found, systems, TraceSettings(description(path), 8, log=tmp_path / "logs")).beside
+
+
 _DOUBTS = """\
 input go : bool
 input load : int 0 .. 10

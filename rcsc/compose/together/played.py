@@ -50,6 +50,7 @@ class Playing:
         admitted: The inputs of each as it last took them: what is refused is not taken.
         given: What stands in the buffers of the parties outside.
         left: What the levels left after each tick, and `told`, what the parties outside gave in each.
+        stood: The inputs of each level as they stood in the tick in which it begins anew, where it does.
     """
 
     ts: Together
@@ -59,6 +60,7 @@ class Playing:
     given: State = field(init=False)
     left: list[Mapping[str, State]] = field(default_factory=list)
     told: list[State] = field(default_factory=list)
+    stood: dict[str, State] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.now = {name: dict(initial(member.program)) for name, member in self.ts.members.items()}
@@ -127,10 +129,14 @@ class Playing:
         member, before = self.ts.members[name], dict(self.now[name])
         taken = {leaf: self.admitted[name][leaf] for leaf in member.inputs} | dict(asked.taken)
         taken |= {leaf: buffers[own] for leaf in member.inputs if (own := f"{name}.{leaf}") in buffers}
+        here = {leaf: taken[leaf] for leaf in self.ts.kept.get(name, ())}
+        found = here if asked.stops or asked.first else self.stood.get(name, here)
+        self.stood[name] = here if asked.due or asked.was_due else found
         if not asked.due:
             return None
         if asked.anew:
-            before, self.found[name] = begun_anew(self.ts, name, before, taken, first=asked.first), None
+            found = taken | found
+            before, self.found[name] = begun_anew(self.ts, name, before, found, first=asked.first), None
         if asked.refused:
             leaf = _refused(member)
             taken[leaf] = refused(member.program.variable(leaf))
@@ -143,10 +149,12 @@ class Playing:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What befalls a level in a tick; `taken`, those inputs that are told."""
+    """What befalls a level in a tick; `taken`, those inputs that are told; `was_due`, whether it ran in the tick before."""
 
     due: bool
+    was_due: bool
     anew: bool
+    stops: bool
     refused: bool
     taken: Mapping[str, Value]
     first: bool
@@ -312,7 +320,10 @@ def _asked(ts: Together, tick: Tick, name: str, given: Mapping[str, int], number
     """Read what befalls a level in a tick; what the run does not tell stays as it is, and does not happen."""
     taken = _told(tick.takes[name], given)
     anew, is_refused = (_happens(of[name], given) for of in (tick.restarts, tick.refuses))
-    return Asked(number % ts.periods[name] == 0, anew, is_refused, taken, first=number == 0)
+    stops = name in tick.stops and _happens(tick.stops[name], given)
+    period = ts.periods[name]
+    due, was_due = number % period == 0, (number - 1) % period == 0
+    return Asked(due, was_due, anew, stops, is_refused, taken, first=number == 0)
 
 
 def _told(leaves: Mapping[str, Node], given: Mapping[str, int]) -> State:

@@ -12,8 +12,9 @@ Three timings:
 - *any*: each level runs in a tick or not, as it happens, and takes of the others whatever the contract of its own proof allows: any value
   that they published, late, twice or never (`compose.__doc__`). What holds so holds of every schedule and every network.
 
-Restarts are part of both: any level may begin anew before any cycle of it (`run.adopt`). As scheduled its inputs are what stands in its
-buffers, and its orders go on from those that it gave last; else as its own proof has it. What stands outside gives any values, as
+Restarts are part of all: any level may begin anew before any tick (`run.adopt`), and is as it was until its next cycle. As scheduled its
+inputs are what stands in its buffers in that tick, older where it does not run then, and its orders go on from those that it gave last;
+else as its own proof has it. What stands outside gives any values, as
 one level's environment does, refused ones too; as scheduled a party's output is one value in a tick, whoever reads it.
 
 What a requirement reads of a level is what the level has after the tick; an input, as the level last took it: a refused value is none.
@@ -43,6 +44,7 @@ from rcsc.lang.leaves import spoken_of
 from rcsc.lang.model import BEFORE, Bool, Int, Kind, Level, OneTable, Program, Property, Scalar, TableName
 from rcsc.lang.operator_table import Op
 from rcsc.lang.over_time.past import FALSE as NEVER
+from rcsc.lang.restart import SameAs
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.run.description import Description
@@ -53,6 +55,8 @@ CALM = f"{GHOST}calm"
 """The ghost that says that in a tick no level began anew, and none was refused an input; where a requirement speaks of it."""
 LATE = f"{GHOST}late"
 """Of ghosts: by how many ticks a reader last saw a buffer late, and what it held some ticks ago."""
+STOOD = f"{GHOST}as it stood"
+"""Of ghosts: an input in the tick before which a level may have begun anew, since it ran last."""
 
 
 class Timing(StrEnum):
@@ -69,12 +73,14 @@ class Tick(Cycle):
 
     Attributes:
         restarts: For each level, that it begins anew before it; `refuses`, that it is refused an input if it runs.
+        stops: For each level of a longer period, that it is in this tick that it does, and in no earlier one.
         takes: For each level, what it takes of what no buffer here holds.
         late: For each buffer and reader, by the reader's end, how late it is seen.
         cycles: The cycle of each level, and `due`, that it runs.
     """
 
     restarts: Mapping[str, Node] = field(default_factory=dict)
+    stops: Mapping[str, Node] = field(default_factory=dict)
     refuses: Mapping[str, Node] = field(default_factory=dict)
     takes: Mapping[str, Leaves] = field(default_factory=dict)
     late: Leaves = field(default_factory=dict)
@@ -118,6 +124,7 @@ class Together(TransitionSystem):
         wired: Each input that takes what a level here gave in the tick before, with that output.
         given: What parties outside give to these levels, with its type.
         held: Each input whose buffer may be seen late, with who writes it: a level here, or a party outside.
+        kept: For each level, the inputs that matter as they stood in the tick in which it begins anew, where it need not run then.
         restarting: Whether levels may begin anew.
         most_late: How many ticks late buffers are seen at most, where timing is *late*.
     """
@@ -132,11 +139,13 @@ class Together(TransitionSystem):
     wired: dict[str, str] = field(init=False)
     given: dict[str, Scalar] = field(init=False)
     held: dict[str, Source] = field(init=False)
+    kept: dict[str, tuple[str, ...]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Derive the leaves: those of all levels, of what stands outside, of buffers that are seen late, and of the monitors."""
         self.wired, self.given = self._wired(), self._given_outside()
         self.held = self._held()
+        self.kept = {} if self.timing is Timing.ANY or not self.restarting else dict(self._kept())
         self.procedures = {}
         self.inputs = ()
         self.kinds = {
@@ -150,6 +159,7 @@ class Together(TransitionSystem):
             self.kinds[NOW] = Int(0, self._round - 1)
         if any(monitor.waits != NEVER for _, monitor in monitors(self.program)):
             self.kinds[CALM] = Bool()
+        self.kinds |= {ghost: self.members[name].kinds[leaf] for ghost, name, leaf in self._stood()}
         for own, source in self.held.items():
             self.kinds[f"{LATE} {source.end}"] = Int(0, self.most_late)
             level, _, leaf = own.partition(".")
@@ -164,6 +174,19 @@ class Together(TransitionSystem):
             for end, source in self.sources.items()
             if source.party in self.members and end.partition(".")[0] in self.members
         }
+
+    def _kept(self) -> Iterator[tuple[str, tuple[str, ...]]]:
+        for name, ts in self.members.items():
+            if self.periods[name] > 1:
+                adopted = {one.leaf for one in ts.program.adopted.values() if isinstance(one, SameAs)}
+                back = {leaf for stated in ts.program.environment for leaf in map(str, spoken_of(stated))}
+                adopted |= {leaf.removeprefix(BEFORE) for leaf in back if leaf.startswith(BEFORE)}
+                yield name, tuple(leaf for leaf in ts.inputs if leaf in adopted)
+
+    def _stood(self) -> Iterator[tuple[str, str, str]]:
+        """Yield each ghost of an input as it stood, with its level and leaf."""
+        for name, leaves in self.kept.items():
+            yield from ((f"{STOOD} {name}.{leaf}", name, leaf) for leaf in leaves)
 
     def _held(self) -> dict[str, Source]:
         if self.timing is not Timing.LATE:
@@ -207,6 +230,7 @@ class Together(TransitionSystem):
             start[NOW] = values.constant(self.kinds[NOW], 0)
         if CALM in self.kinds:
             start[CALM] = TRUE
+        start |= {ghost: start[f"{name}.{leaf}"] for ghost, name, leaf in self._stood()}
         for own, source in self.held.items():
             start[f"{LATE} {source.end}"] = values.constant(Int(0, self.most_late), 0)
             start |= {ago(own, ticks): start[own] for ticks in range(1, self.most_late + 1)}
@@ -227,6 +251,7 @@ class Together(TransitionSystem):
     def _tick(self, before: Leaves, suffix: str, *, first: bool) -> Tick:
         cycles, late = dict[str, Cycle](), self._late(suffix)
         due, restarts, takes = dict[str, Node](), dict[str, Node](), dict[str, Leaves]()
+        stops = {name: values.variable(f"{name} is stopped{suffix}", Bool()) for name in self.kept}
         after = dict(before)
         for name, ts in self.members.items():
             due[name] = self._due(name, before, suffix)
@@ -237,7 +262,13 @@ class Together(TransitionSystem):
             held = {*self.wired, *self.held}
             takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in held}
             stood = {leaf: before[f"{name}.{leaf}"] for leaf in ts.kinds}
-            start = _or(restarts[name], self._anew(name, stood, taken, suffix, first=first), stood)
+            found = dict(taken)
+            for leaf in () if first else self.kept.get(name, ()):
+                found[leaf] = values.choice(stops[name], taken[leaf], before[f"{STOOD} {name}.{leaf}"])
+            start = _or(restarts[name], self._anew(name, stood, found, suffix, first=first), stood)
+            for leaf in self.kept.get(name, ()):
+                new = values.either(due[name], self._at(name, before, 1))
+                after[f"{STOOD} {name}.{leaf}"] = values.choice(new, taken[leaf], found[leaf])
             cycles[name] = ts.cycle(start, f" of {name}{suffix}", taken)
             ended = _or(due[name], cycles[name].after, stood)
             nothing = values.both(restarts[name], cycles[name].untaken)  # taken, since it began anew
@@ -265,6 +296,7 @@ class Together(TransitionSystem):
             before, {}, contract, after, tables, after,
             calls=tuple(call for each in cycles.values() for call in each.calls),
             restarts=restarts,
+            stops=stops,
             takes=takes,
             late=late,
             cycles=cycles,
@@ -275,8 +307,8 @@ class Together(TransitionSystem):
     def _anew(self, name: str, stood: Leaves, taken: Leaves, suffix: str, *, first: bool) -> Leaves:
         """Return the state in which a level begins anew (`run.adopt.restart`).
 
-        As scheduled its buffers hold what it gave last, and what it takes; at first they are empty. Else they hold something, as far as the
-        contract goes.
+        As scheduled its buffers hold what it gave last, and what it finds in them; at first they are empty. Else they hold something, as
+        far as the contract goes.
         """
         ts = self.members[name]
 
@@ -294,10 +326,13 @@ class Together(TransitionSystem):
     def _due(self, name: str, before: Leaves, suffix: str) -> Node:
         if self.timing is Timing.ANY:
             return values.variable(f"{name} runs{suffix}", Bool())
-        period = self.periods[name]
+        return self._at(name, before, 0)
+
+    def _at(self, name: str, before: Leaves, ticks: int) -> Node:
+        """Return the condition that a level was due so many ticks ago."""
         if NOW not in self.kinds:
             return TRUE
-        at = range(0, self._round, period)
+        at = range(ticks, self._round, self.periods[name])
         return values.any_of(values.equal(before[NOW], values.constant(self.kinds[NOW], tick)) for tick in at)
 
     def _counted(self, now: Node) -> Node:
