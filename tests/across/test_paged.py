@@ -82,6 +82,20 @@ def test_what_is_about_every_cycle_needs_no_run_and_one_of_a_level_has_a_page_to
     assert (status, "A run that breaks it" in text, "cycle 2: broken here" in text) == (1, True, True)
 
 
+def test_a_run_that_waits_for_ever_and_buffers_that_are_late_are_told_as_that(
+    tmp_path: Path, rcsc: Rcsc
+) -> None:
+    soon = "requirement some_time : when boss.go_left, eventually right.runs\n"
+    path = _written(tmp_path, soon)
+    status, _, text = _page(rcsc, path, "some_time")
+    assert (status, "it waits for ever, and the cycles from" in text) == (1, True)
+    (tmp_path / "all.rcs").write_text(_OBEYS.replace("within 1", "within 2"))
+    path.write_text(path.read_text().replace("tick_ms = 10", "tick_ms = 10\nlate_ticks = 1"))
+    text = _page(rcsc, path, "obeys")[2]
+    assert "with buffers at most 1 tick late" in text
+    assert "As scheduled, and each reader may see a buffer so many ticks later" in text
+
+
 def test_the_same_requirement_gives_the_same_page_which_loads_nothing(tmp_path: Path, rcsc: Rcsc) -> None:
     path = _written(tmp_path, _SOON)
     _page(rcsc, path, "soon")

@@ -58,6 +58,7 @@ class RequirementStory:
         facts: What it is about: a name, what that is, and a digest.
         asks: Whether the run asks for the response; else it breaks the requirement.
         without: Why no run is shown; empty where one is.
+        waits: The first cycle of those that come again and again, where the run waits for ever; else 0.
     """
 
     word: str
@@ -76,6 +77,7 @@ class RequirementStory:
     facts: tuple[tuple[str, str, str], ...]
     asks: bool = False
     without: str = ""
+    waits: int = 0
 
 
 def requirement_page(story: RequirementStory, log: Log | None) -> str:

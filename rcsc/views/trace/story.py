@@ -12,6 +12,7 @@ from pathlib import Path
 from rcsc.base.host.files.read import MOST_OF_OURS, content
 from rcsc.compose.contract.claims import ACCEPTED, RUNS, Closed, spelled
 from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import Across
 from rcsc.driver.requirements import Read, of_answer, place
 from rcsc.lang.meaning import digest
@@ -27,7 +28,13 @@ _TICKS = "the ticks that `rcsc run` and the C of the system make: a buffer takes
 _SCHEDULED = (
     f"As scheduled: {_TICKS}. Where buffers come later, or levels run when they like, nothing is promised."
 )
+_LATE = (
+    f"As scheduled, and each reader may see a buffer so many ticks later, now more, now less: {_TICKS}. Where buffers come later than "
+    "that, or levels run when they like, nothing is promised."
+)
 _RUN = f"The run is one of the system as it is scheduled: {_TICKS}."
+_RUN_LATE = f"The run is one of the system as it is scheduled, with buffers that are seen late: {_TICKS}."
+_PROMISED = {Timing.ANY: _ANY, Timing.LATE: _LATE, Timing.SCHEDULED: _SCHEDULED}
 _RESTARTS = "Any level may begin anew at any moment, and inputs from outside may be refused, but for what is trusted below."
 
 
@@ -40,15 +47,16 @@ def across_story(its: Read, whole: SystemProof, found: Across) -> RequirementSto
         (f"level `{name}`: each cycle of it goes on, and what it takes is as it assumes", (name, RUNS))
         for name in found.levels
     ]
-    timing = _RUN if found.refuted else ""
+    timing = (_RUN_LATE if any(found.run_late) else _RUN) if found.refuted else ""
     if found.proved:
-        timing = f"{_ANY if known.timing == 'any' else _SCHEDULED} {_RESTARTS}"
+        timing = f"{_PROMISED[found.timing]} {_RESTARTS}"
     return replace(
         _story(its, found.stated, "", closed),
         place=known.place,
         state=known.state,
         verdict=known.words,
         timing=timing,
+        waits=found.lasso if found.refuted else 0,
         rests=tuple((words, _verdict(whole, whole.of(*need))) for words, need in rests),
     )
 
