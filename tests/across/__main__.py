@@ -1,7 +1,7 @@
 """Many drawn systems: `python -m tests.across --count 300 --seed 0`.
 
 Seeds are numbers: those from `--seed` on, `--count` of them. Of each the requirements across levels are answered and judged by running
-the levels, with buffers that are never late, a tick late, and two, in turn; so is what comes eventually, and what is proved of levels
+the levels, with buffers that are never late, a tick late, and two, in turn; so is what comes eventually, what is proved of levels
 together of what their contracts leave open, and what is found of plain outputs. Prints the verdicts, counted, and each difference with
 its seed, also where Ctrl-C ends it.
 

@@ -23,7 +23,7 @@ from rcsc.run.description import Description, description
 from rcsc.run.levels import StateTableError, running_level
 from rcsc.run.system import System, executors, signatures
 
-MOST_TICKS, MOST_LISTED = 6_000, 20_000
+MOST_TICKS, MOST_LISTED = 5_000, 15_000
 """Ticks that are run for one requirement: what is longer stays open; and where all states are listed."""
 
 
@@ -212,10 +212,8 @@ class Running:
         for tick in range(most):
             after = []
             for _, kept in here:
+                due = [kept[-1] * 10 % level.level.period_ms == 0 for level in self.system.levels]
                 for values, anew, by in product(given, again, self._ages(kept, late=late)):
-                    due = [
-                        self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels
-                    ]
                     if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
                         continue  # it begins anew before a cycle of it
                     ran += 1
@@ -250,8 +248,8 @@ class Running:
         given = list(product(*(self.inputs[name] for name in names)))
         while here:
             key, kept = here.pop()
+            due = [kept[-1] * 10 % level.level.period_ms == 0 for level in self.system.levels]
             for of, anew in product(given, product((False, True), repeat=len(names))):
-                due = [self.system.tick * 10 % level.level.period_ms == 0 for level in self._at(kept).levels]
                 if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
                     continue
                 ran += 1
