@@ -21,7 +21,7 @@ What a level assumes of its environment is the contract (`transition`):
 - of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last order is about the
   command of that order; (2) the number after the last one is not echoed; (3) once the last order is echoed, it stays so until another is
   given. Nothing about the status, about how long anything takes, or about reports on older orders; - of any level of which it says so in a
-  declared assumption about one buffer: that what is published there is so (`contract.facts`);
+  declared assumption about one buffer, or of which it is found: that what is published there is so (`contract.facts`, `together.plain`);
 - of the database: the same question has the same answer; of what comes from outside, what is assumed over time (`contract.watched`);
 - of everything else: its declared range. What no level writes may also come as a value that is *refused*: that cycle takes nothing
   (`rcsc.lang.protocol.environment`), as often as the environment likes. Claims are proved of such an environment first. Only what is not
@@ -36,7 +36,8 @@ echoing the last one (3); and an order taken twice under one number is one order
 reports: for its neighbours the level is late by a cycle, and what it takes next is compared with what it took last. So the contract holds
 up to the next cycle, in which, by the proofs of the levels, every guarantee is kept again; at first it holds because both begin with the
 same order (checked, `system`). This is induction over cycles of all levels at once: a guarantee in a cycle rests on contracts about what
-was published before it. So levels are proved one by one, and the cost grows with their number.
+was published before it. So levels are proved one by one, and the cost grows with their number. What the contract leaves open of a level is
+asked of it together with those that write to it, as they are scheduled, by the same induction (`together.left_open`).
 
 Further assumptions:
 
