@@ -158,6 +158,36 @@ def test_a_wire_that_is_crossed_is_found(tmp_path: Path) -> None:
     assert _answers(_written(tmp_path, answered, crossed=True))["obeys"].refuted
 
 
+_OBEYS = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
+
+
+@pytest.mark.parametrize(
+    ("slip", "told"),
+    [
+        (('"boss.go_left" = "left.go"\n', ""), ["never_both", "obeys"]),
+        (('"left.runs" = "boss.left_runs"\n', ""), []),
+        (('"left.runs" = "boss.left_runs"', '"left.runs" = "panel.runs"\n"panel.left" = "boss.left_runs"'), []),
+        (("boss.left_runs", "boss.other"), []),
+        (("left.go", "other.go"), ["obeys"]),
+    ],
+    ids=["a wire is cut", "an echo is dropped", "an echo goes elsewhere", "echoes are swapped", "orders are swapped"],
+)  # fmt: skip
+def test_a_slip_in_the_wires_is_refuted_or_shown_to_do_nothing(
+    tmp_path: Path, slip: tuple[str, str], told: list[str]
+) -> None:
+    path = _written(tmp_path, _BOTH + _OBEYS)
+    text = path.read_text()
+    if "other" in slip[1]:  # two ends change places
+        first, second = slip[0], slip[0].replace("left", "right")
+        text = text.replace(first, "OTHER").replace(second, first).replace("OTHER", second)
+    path.write_text(text.replace(*slip) if "other" not in slip[1] else text)
+    found = _answers(path)
+    assert [name for name, one in found.items() if one.refuted] == told
+    assert all(
+        one.proved for name, one in found.items() if name not in told
+    )  # as scheduled, no echo is needed
+
+
 def test_a_level_of_a_longer_period_reacts_later(tmp_path: Path) -> None:
     late = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
     later = late.replace("within 1", "within 2")

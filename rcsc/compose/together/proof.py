@@ -247,7 +247,8 @@ class Question:
                     return replace(
                         told, fair=(COMES_TO_AN_END, *dict.fromkeys(trust for trust, _ in parties))
                     )
-        return found
+        run, known = self._run(EVERY[0], LONG, Timing.SCHEDULED)
+        return replace(found, run=run.ticks, broken_in=EVERY[0] if run.ticks else None, looked=known)
 
     def _with_lasso(self, found: Across) -> tuple[Across, Waits]:
         """Look for a run on which it waits for ever; return for how long it waits."""
