@@ -278,22 +278,43 @@ def _never_back(ts: Together, late: Mapping[str, int], before: Mapping[str, int]
 def plainest(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun | None:
     """Run a run of the circuit as `played` does, without those restarts and late buffers that it breaks the requirement without.
 
-    Where parties outside keep to a contract all are kept: they might not do the same of a run that is another.
+    Where parties outside keep to a contract, all are kept that change what a level gives, or that are of what those parties give: they
+    might not do the same of a run that is another. Where the database is asked, all are.
     """
     found = played(ts, made, run, stated)
     links = [member.links for member in ts.members.values()]
-    if found is None or any(one.asked or one.below or one.above is not None for one in links):
+    outside = {
+        party.name for one in links for party in (*one.below, *((one.above,) if one.above else ()))
+    } - {*ts.members}
+    bound = bool(outside)
+    if any(one.asked for one in links):
         return found
-    for at in range(len(run.given)):
+    parties = {source.end: source.party for source in ts.sources.values()}
+    for at in range(len(run.given) if found is not None else 0):
         tick = made.step.cycle if at else made.firsts[run.begins].cycle
         assert isinstance(tick, Tick)
-        for node in (*tick.restarts.values(), *tick.late.values()):
+        late = [node for end, node in tick.late.items() if parties[end] not in outside]
+        for node in (*late, *(() if bound else tick.restarts.values())):
             if not node.known and run.given[at].get(node.name):
                 without = ({**one, node.name: 0} if at == of else one for of, one in enumerate(run.given))
                 other = replace(run, given=tuple(without))
-                if (plainer := played(ts, made, other, stated)) is not None:
+                plainer = played(ts, made, other, stated)
+                if plainer is not None and (not bound or _gives_the_same(ts, found, plainer)):
                     run, found = other, plainer
     return found
+
+
+def _gives_the_same(ts: Together, one: PlayedRun | None, other: PlayedRun) -> bool:
+    """Return whether the levels of two runs leave the same, but for what they take."""
+    left = (
+        [
+            {leaf: value for leaf, value in step.after.items() if leaf not in ts.members[name].inputs}
+            for tick in run.ticks
+            for name, step in tick.items()
+        ]
+        for run in (one or PlayedRun(), other)
+    )
+    return next(left) == next(left)
 
 
 def _least_late(
