@@ -57,7 +57,7 @@ SHORT, LONG = 8, 60
 """Ticks of the runs that are looked for before a proof is tried, and after it."""
 MOST_STEPS = 10_000_000
 """What Spacer gets for a requirement, in steps: less than 10 s."""
-FEWEST, HARDER = 1_000, 10
+FEWEST, HARDER = 1_000, 2
 """How often the SAT solver is asked of harder surroundings, at least, and how many times as often as of the kindest."""
 NO_RESTART = "no level begins anew while the system runs"
 """What is trusted where levels do not begin anew."""
@@ -197,18 +197,21 @@ class Question:
         monitor = self.stated.monitor
         if not found.proved or monitor is None or monitor.asks == TRUE:
             return found
-        return replace(found, vacuous=self.asks().proved)
+        return replace(found, vacuous=self._never_asked.verdict(soon=True).proved)
 
     def asks(self) -> Across:
         """Answer whether nothing ever asks for its response; what refutes that is a run that does."""
+        return self._never_asked.verdict()
+
+    @property
+    def _never_asked(self) -> "Question":
         assert self.stated.monitor is not None
         monitor = replace(self.stated.monitor, waits=FALSE)
         never = replace(self.stated, condition=negation(monitor.asks), monitor=monitor)
-        program = replace(self.program, properties=(never,))
-        return replace(self, program=program, stated=never).verdict()
+        return replace(self, program=replace(self.program, properties=(never,)), stated=never)
 
-    def verdict(self) -> Across:
-        """Prove it or refute it."""
+    def verdict(self, *, soon: bool = False) -> Across:
+        """Prove it or refute it; if soon, leave open what takes more than short runs and invariants over predicates."""
         ts = self.together(self.every, Timing.SCHEDULED, EVERY[0])
         assumed = tuple(one.name for one in ts.program.environment)
         stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
@@ -219,13 +222,14 @@ class Question:
             return self._eventually(found)
         left = list[tuple[Surroundings, Timing]]()
         in_kindest = dict[_Part, Shown | None]()
+        little = Shown(FoundInvariant()) if soon else None
         for around in self._surroundings():
             found, broken = self._with_short_runs(found, around)
             left += [(around, timing) for timing in self._timings if timing not in broken]
             for part in self._parts():
-                if part[0] not in broken and self._proved_at_last(in_kindest, part, around):
+                if part[0] not in broken and self._proved_at_last(in_kindest, part, around, little):
                     return self._as_proved(self._kindest(found), *part, around, "")
-        return self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
+        return found if soon else self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
 
     def _eventually(self, found: Across) -> Across:
         """Prove within which bound it comes, or refute it: by a run that a tick breaks, or one on which it waits for ever."""
@@ -335,16 +339,25 @@ class Question:
     # --- proofs ---
 
     def _proved_at_last(
-        self, in_kindest: dict["_Part", "Shown | None"], part: "_Part", around: Surroundings
+        self,
+        in_kindest: dict["_Part", "Shown | None"],
+        part: "_Part",
+        around: Surroundings,
+        begun: "Shown | None",
     ) -> bool:
-        """Return whether it is proved in these surroundings; of what is not in the kindest, which costs least, nothing harder is tried."""
+        """Return whether it is proved in these surroundings.
+
+        Nothing harder is tried of what is not proved in the kindest ones, which costs least, nor of more levels than suffice there.
+        """
         kindest = tuple(self._surroundings())[-1]
-        if part not in in_kindest:
-            in_kindest[part] = self._proved(part, kindest)
-        begun = in_kindest[part]
-        return begun is not None and (
-            around == kindest or self._proved(part, around, begun=begun) is not None
-        )
+        if any(shown is not None for (timing, _), shown in in_kindest.items() if timing is part[0]):
+            begun = in_kindest.get(part)
+        else:
+            begun = None if part in in_kindest else self._proved(part, kindest, begun=begun)
+            in_kindest[part] = begun
+        if begun is None:
+            return False
+        return around == kindest or self._proved(part, around, begun=begun) is not None
 
     def _proved(
         self,
