@@ -4,6 +4,9 @@ Chains of n levels and m tables, in the shape of the shipped ones: every level h
 which orders two commands of the level below, one after the other; states are deferred, orders numbered, DEFAULT declared unreachable.
 Printed: seconds and questions to the solvers, of a level and of the system, what is not proved (`open`), and the ratio to the row before.
 Levels are proved one by one: the questions of a system are the sum of its levels' (`tests/compose/test_hierarchies.py`).
+
+`--across N...`: requirements across chains of so many levels of three tables each. A PAUSE of the highest reaches the lowest after a tick a
+level; and one that the lowest two keep, whatever stands above them.
 """
 
 import argparse
@@ -20,8 +23,11 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import prove_level
 from rcsc.compose.proof.system import transition_systems
+from rcsc.compose.together.proof import Across, Question
+from rcsc.compose.together.words import stated_across
 from rcsc.proof.solvers.sat import Sat
 from rcsc.proof.solvers.smt import Solver
+from rcsc.run.description import description
 from tests.small_hierarchies.made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
 from tests.small_hierarchies.text import written
 
@@ -160,13 +166,47 @@ def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
         yield f"{levels:>6} {tables:>6} {seconds:>8.1f} {questions:>9} {seconds / levels:>9.2f} {dearest:>14.2f} {left:>5} {ratio}"
 
 
+def across(levels: int) -> Iterator[tuple[str, Across, float]]:
+    """Answer two requirements of a chain: one from end to end, one of the lowest two levels; yield each with its processor time."""
+    with tempfile.TemporaryDirectory(prefix="rcsc-growth-") as folder:
+        path = written(chain((3,) * levels), Path(folder))
+        path.write_text('requirements = "all.rcs"\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
+        (path.parent / "all.rcs").write_text(
+            "".join(
+                f"requirement {name} : whenever l{upper}.command.input_command = pause for {levels - 1 - upper} cycles, "
+                f"at once l{levels - 1}.command.input_command = pause\n"
+                for name, upper in (("end_to_end", 0), ("lowest_two", levels - 2))
+            ),
+            encoding="utf-8",
+        )
+        known, system = transition_systems(path), description(path)
+        stated = stated_across(system, {name: ts.program for name, ts in known.items()})
+        assert stated is not None
+        for one in stated[0].properties:
+            begun = time.process_time()
+            found = Question(known, system, stated[0], one).verdict()
+            yield one.name, found, time.process_time() - begun
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Prints the tables, or one size level by level."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.growth", description=__doc__)
     parser.add_argument(
         "--tables", type=int, nargs="+", default=(), help="one size only: the tables of each level"
     )
+    parser.add_argument(
+        "--across", type=int, nargs="+", default=(), help="requirements across chains of so many levels"
+    )
     given = parser.parse_args(arguments)
+    for levels in given.across:
+        for name, found, seconds in across(levels):
+            verdict = "proved" if found.proved else "open"
+            print(
+                f"{levels:>6} levels  {name:12} {verdict} of {len(found.levels):>2}  {seconds:>6.1f} s",
+                flush=True,
+            )
+    if given.across:
+        return 0
     if given.tables:
         for cost in costs(chain(given.tables)):
             print(
