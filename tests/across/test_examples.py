@@ -14,8 +14,11 @@ from rcsc.front.commands import run
 from rcsc.run.description import description
 from tests.bench.growth import across
 
+Edited = Callable[[Path, str, str, str], Path]
 VERDICTS = ("p1", "p2", "p3", "p6", "p6_anew", "p7", "p7_mission", "p8")
-AMR = Path(__file__).parents[2] / "tables" / "examples" / "amr"
+EXAMPLES = Path(__file__).parents[2] / "tables" / "examples"
+AMR = EXAMPLES / "amr"
+NODES = EXAMPLES / "two_nodes"
 
 
 def _question(folder: Path, name: str) -> Question:
@@ -34,12 +37,12 @@ def _answer(folder: Path, name: str) -> Across:
 
 
 @pytest.fixture
-def edited(tmp_path: Path) -> Callable[[str, str, str], Path]:
-    """Return how a copy of the robot is made in which one text stands for another, in every place."""
+def edited(tmp_path: Path) -> Edited:
+    """Return how a copy of an example is made in which one text stands for another, in every place."""
 
-    def copy(file: str, old: str, new: str) -> Path:
-        folder = tmp_path / "amr"
-        shutil.copytree(AMR, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
+    def copy(example: Path, file: str, old: str, new: str) -> Path:
+        folder = tmp_path / example.name
+        shutil.copytree(example, folder, ignore=shutil.ignore_patterns("generated", ".rcsc-cache"))
         text = (folder / file).read_text(encoding="utf-8")
         assert old in text
         (folder / file).write_text(text.replace(old, new), encoding="utf-8")
@@ -55,11 +58,24 @@ def test_the_emergency_stop_holds_drive_and_lift_whatever_restarts_or_is_refused
     assert found.around.restarts
 
 
-def test_a_cut_wire_of_the_emergency_stop_is_shown(edited: Callable[[str, str, str], Path]) -> None:
-    cut = edited("system.toml", '["drive.estop", "lift.estop"]', '"drive.estop"')
+def test_a_cut_wire_of_the_emergency_stop_is_shown(edited: Edited) -> None:
+    cut = edited(AMR, "system.toml", '["drive.estop", "lift.estop"]', '"drive.estop"')
     found = _answer(cut, "p2")
     assert found.refuted
     assert len(found.run) == 4
+
+
+def test_two_equal_nodes_never_disagree_for_good() -> None:
+    found = _answer(NODES, "agree")
+    assert (found.proved, found.levels) == (True, ("manager", "left", "right"))
+    assert not found.around.restarts
+
+
+def test_how_long_they_may_disagree_is_shown(edited: Edited) -> None:
+    sooner = edited(NODES, "requirements.rcs", "for 7 cycles", "for 6 cycles")
+    found = _answer(sooner, "agree")
+    assert found.refuted
+    assert len(found.run) == 8
 
 
 def test_a_requirement_of_two_levels_is_proved_of_them_alone_whatever_stands_above() -> None:
