@@ -41,9 +41,8 @@ asked of it together with those that write to it, as they are scheduled, by the 
 
 Further assumptions:
 
-- *Numbers.* They are 16 bits and wrap; the proof treats them so. "65536 numbers apart" is excluded by *freshness*: no level is so late
-  that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that waits for echoes before it
-  orders again cannot come near it (`WAITS`).
+- *Numbers* are of 16 bits and wrap; the proof treats them so. "65536 numbers apart" is excluded by *freshness*: no level is so late that
+  all numbers go round, which takes at least 65536 cycles, 43 minutes at 40 ms. One that waits for echoes comes nowhere near it (`WAITS`).
 - *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the order in its buffer,
   or after the echo if the buffer is empty, what it takes counts as seen, and its report echoes what it echoed, so that no echo goes back
   even if its first cycles are refused; what is adopted otherwise is refuted (`NEXT_NUMBER`, `ECHOES`). Its buffers hold what neighbours

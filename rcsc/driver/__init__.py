@@ -22,7 +22,7 @@ What was proved stays proved while nothing that it depends on changes; an unchan
 Trusted: that only what was proved is emitted, which the types say (`lower` takes a `ProvedProgram`), and the cache
 (`rcsc.base.host`).
 
-Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check
-remembered), `proofs` (of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of
-the levels say), `watched` (what was proved of them, for `rcsc campaign`); then `check`, `compile` and `trials` (`rcsc test`).
+Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check remembered), `proofs`
+(of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of the levels say), `requirements` (how
+all that is required stands), `watched` (what was proved, for `rcsc campaign`); then `check`, `compile` and `trials` (`rcsc test`).
 """

@@ -30,6 +30,7 @@ the plant, and the reference interpreter for what a property means. An episode p
 cycle and level.
 
 Modules, in the order the data flows: `episode` and `outcome` (values), `stand` (what a system declares), `operator` (who orders),
-`subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what was proved), `properties`, `harm`
-(buffers in which something goes wrong, and whose fault it is), `loop` (runs one), `sampling` (draws one, by seed or for Hypothesis).
+`subordinates` (who obeys, where there is no plant), `cycle` (what a property sees), `proved` (what was proved), `properties`, `across`
+(requirements across levels), `harm` (buffers in which something goes wrong, and whose fault it is), `loop` (runs one), `sampling` (draws
+one, by seed or for Hypothesis).
 """
