@@ -229,7 +229,8 @@ class Question:
             for part in self._parts():
                 if part[0] not in broken and self._proved_at_last(in_kindest, part, around, little):
                     return self._as_proved(self._kindest(found), *part, around, "")
-        return found if soon else self._with_effort(found, tuple(dict.fromkeys((*left[:2], *left[-1:]))))
+        effort = dict.fromkeys((*left[: len(self._timings)], *left[-1:]))
+        return found if soon else self._with_effort(found, tuple(effort))
 
     def _eventually(self, found: Across) -> Across:
         """Prove within which bound it comes, or refute it: by a run that a tick breaks, or one on which it waits for ever."""
