@@ -28,12 +28,17 @@ MOST_OF_A_FILE_S = 3.0
 """Time that the cases of a file may take in the ordinary run."""
 KEPT = frozenset(
     {
+        "across/test_across.py::test_prove_tells_requirements_first_with_timing_levels_and_runs",
+        "across/test_eventually.py::test_prove_names_what_it_trusts_and_tells_the_loop",
+        "across/test_examples.py::test_a_cut_wire_of_the_emergency_stop_is_shown",
+        "across/test_needed.py::test_the_command_tells_it_of_each_level",
         "commands/test_readme.py::test_the_commands_of_a_guide_end_as_it_says[README.md]",
         "commands/test_tutorial.py::test_whoever_follows_the_tutorial_sees_what_it_shows",
         "compose/test_composed_search.py::test_a_line_that_counts_when_it_matches_again_is_named[False]",
         "compose/test_endings.py::test_what_falls_ends[a sum]",
         "compose/test_hierarchies.py::test_the_proof_and_the_enumeration_agree_of_random_hierarchies",
         "compose/test_protocol.py::test_every_obligation_of_a_docking_robot_is_stated_and_proved",
+        "editor/test_across.py::test_renaming_goes_from_a_level_to_the_requirements_and_back",
         "exact/test_eventual.py::test_what_eventually_comes_is_proved_and_what_never_does_is_shown",
         "over_time/test_assumed.py::test_nothing_false_is_proved_where_inputs_are_refused",
         "over_time/test_manual.py::test_each_example_is_proved_refuted_or_vacuous_as_it_says[requirements]",
