@@ -573,6 +573,7 @@ def spans(node: object) -> object:
         "property a : b for (-3) cycles\n",
         "property a : once (when.a)\n",
         "property a : once whenever\n",
+        "property a : once not always and once (for.a)\n",
     ],
 )
 def test_words_of_requirements_are_names_where_they_stand_as_one(text: str) -> None:

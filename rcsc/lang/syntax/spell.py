@@ -36,7 +36,7 @@ _AFTER_A_SCOPE = frozenset(
 """Words that would make a scope of `before c,`; a response that begins with a variable called so stands in parentheses."""
 
 
-_AFTER_ONCE = frozenset("and or xor implies in not mod when for since then until upon".split())
+_AFTER_ONCE = frozenset("and or xor implies in mod when for since then until upon".split())
 """Words after which a name `once` looks back at nothing (`ONCE` of the grammar)."""
 _BEFORE_BRACKETS = frozenset(
     "while unless before after between from only when whenever next always never eventually within for exactly until".split()
