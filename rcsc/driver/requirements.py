@@ -12,7 +12,7 @@ from pathlib import Path
 from rcsc.base.diagnostics import report
 from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.cache import Cache
-from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, declared, spelled
+from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, declared
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict, standing
 from rcsc.compose.proof.system import loaded_program, transition_systems_of
@@ -134,13 +134,12 @@ def of_answer(
 ) -> KnownRequirement:
     """Return the standing of a requirement across levels that was answered."""
     closed = found.closed(systems, claims)
-    lacking = report.named([spelled(need, "", claims) for need in closed.lacks])
     return KnownRequirement(
         "",
         found.stated,
         where,
         state(found, closed),
-        said(found, closed, lacking),
+        said(found, closed, claims),
         found.timing.value if found.proved else "",
         found.levels,
         tuple(trusts_of(found, closed)),

@@ -204,7 +204,7 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
         late = {end: int(ticks) for end, ticks in _told(tick.late, given).items()}
         if not _never_back(ts, late, ages[-1] if ages else {}):
             return None
-        ticks.append(_ticked(playing, tick, given, number))
+        ticks.append(_ticked(playing, tick, given, number, late))
         ages.append(late)
         after = playing.state
         if any(step.ends_the_run for step in ticks[-1].values()):
@@ -215,11 +215,13 @@ def played(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun
     return None if kept else PlayedRun(tuple(ticks), _least_late(playing, ticks, ages))
 
 
-def _ticked(playing: Playing, tick: Tick, given: Mapping[str, int], number: int) -> dict[str, CycleRun]:
-    """Run a tick as the circuit says."""
+def _ticked(
+    playing: Playing, tick: Tick, given: Mapping[str, int], number: int, late: Mapping[str, int]
+) -> dict[str, CycleRun]:
+    """Run a tick as the circuit says, with buffers that are so late."""
     asked = {name: _asked(playing.ts, tick, name, given, number) for name in playing.ts.members}
     outside = _told({leaf: tick.after[leaf] for leaf in playing.ts.given}, given)
-    return playing.tick(asked, outside, {end: int(ticks) for end, ticks in _told(tick.late, given).items()})
+    return playing.tick(asked, outside, late)
 
 
 def played_lasso(
@@ -247,7 +249,7 @@ def played_lasso(
         assert isinstance(tick, Tick)
         before = playing.state
         stood += [_compared(playing, made, waits)] if at == begins else []
-        ran = _ticked(playing, tick, given, number)
+        ran = _ticked(playing, tick, given, number, {})
         after = playing.state
         calm = all(one.fault is not Fault.ADMIT and not one.anew for one in ran.values())
         kept = [watch.keeps(before, after), not any(one.ends_the_run for one in ran.values())]

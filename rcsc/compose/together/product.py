@@ -252,14 +252,13 @@ class Together(TransitionSystem):
         cycles, late = dict[str, Cycle](), self._late(suffix)
         due, restarts, takes = dict[str, Node](), dict[str, Node](), dict[str, Leaves]()
         stops = {name: values.variable(f"{name} is stopped{suffix}", Bool()) for name in self.kept}
-        after = dict(before)
+        after, held = dict(before), {*self.wired, *self.held}
         for name, ts in self.members.items():
             due[name] = self._due(name, before, suffix)
             restarts[name] = FALSE
             if self.restarting:  # before a cycle of it: what it gave last stands until then
                 restarts[name] = values.variable(f"{name} begins anew{suffix}", Bool())
             taken = self._taken(name, before, suffix, late, first=first)
-            held = {*self.wired, *self.held}
             takes[name] = {leaf: node for leaf, node in taken.items() if f"{name}.{leaf}" not in held}
             stood = {leaf: before[f"{name}.{leaf}"] for leaf in ts.kinds}
             found = dict(taken)

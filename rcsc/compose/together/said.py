@@ -3,20 +3,22 @@
 In: an answer, and what it rests on. Out: text.
 """
 
+from collections.abc import Collection
+
 from rcsc.base.diagnostics import report
 from rcsc.code.testing.figures import counted
-from rcsc.compose.contract.claims import Closed, declared
+from rcsc.compose.contract.claims import Closed, Need, declared, spelled
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across
 
 
-def said(found: Across, closed: Closed, lacking: str) -> str:
+def said(found: Across, closed: Closed, claims: Collection[Need]) -> str:
     """Return the verdict in words, with the timing, the levels, what it rests on and what it trusts.
 
     Args:
         found: The answer.
         closed: The same with all that it rests on.
-        lacking: What of that is not proved, in words.
+        claims: Those of the levels that are known.
     """
     levels = ", ".join(f"`{name}`" for name in found.levels)
     if not found.proved:
@@ -30,6 +32,7 @@ def said(found: Across, closed: Closed, lacking: str) -> str:
         return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
     where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
     if closed.lacks:
+        lacking = report.named([spelled(need, "", claims) for need in closed.lacks])
         return f"rests on {lacking}; given that, proved {where}"
     return f"{'vacuous, ' if found.vacuous else ''}proved {where}{report.trusting(trusts_of(found, closed))}"
 

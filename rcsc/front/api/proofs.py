@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcsc.base.diagnostics.report import Report, named
+from rcsc.base.diagnostics.report import Report
 from rcsc.base.host.cache import Cache, open_cache
 from rcsc.code.emit import TARGETS
 from rcsc.compose.contract.beginning import starts
@@ -267,13 +267,12 @@ def _requirements(
     given = answers(systems, proof, settings, cache)
     for found, explanation in () if given is None else given.every:
         closed = found.closed(systems, proof.closed)
-        lacking = named([spelled(need, "", proof.closed) for need in closed.lacks])
         finding = None if explanation is None or explanation.beside else explanation.finding
         yield Requirement(
             found.stated.name,
             found.stated.text,
             state(found, closed),
-            said(found, closed, lacking),
+            said(found, closed, proof.closed),
             found.proved and closed.proved,
             found.vacuous,
             found.kinder,

@@ -38,8 +38,7 @@ _FREER = "let the assumptions restrict less: whatever the levels do must leave v
 
 def standing(systems: Mapping[str, TransitionSystem], whole: SystemProof, found: Across) -> str:
     """Return the verdict in words, with the timing, the levels, what it rests on and what it trusts."""
-    closed = found.closed(systems, whole.closed)
-    return said(found, closed, named(whole, "", closed.lacks))
+    return said(found, found.closed(systems, whole.closed), whole.closed)
 
 
 def lines_of(systems: Mapping[str, TransitionSystem], whole: SystemProof, given: Answers) -> Iterator[str]:
