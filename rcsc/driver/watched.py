@@ -31,8 +31,9 @@ from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
-from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
+from rcsc.compose.proof.system import SystemProof, read_systems
 from rcsc.compose.together.kept import answered, recalled
+from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, Question
 from rcsc.compose.together.said import timing_of
@@ -68,9 +69,9 @@ def claims_of(path: Path, cache: Cache | None, jobs: int = 1) -> Claims:
         systems = read_systems(path)[0]
     except CodedError as error:
         return Claims(why=str(error))
-    proof = prove_transition_systems(systems, None, jobs, tuple(systems), None, cache)
-    claims = proved_claims(path, systems, proof)
-    return replace(claims, across=tuple(_across(description(path), systems, proof, cache)))
+    whole = whole_proof(systems, description(path), jobs=jobs, cache=cache)
+    claims = proved_claims(path, whole.systems, whole.proof)
+    return replace(claims, across=tuple(_across(description(path), whole.systems, whole.proof, cache)))
 
 
 def _across(

@@ -9,10 +9,16 @@ from random import Random
 import pytest
 
 from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, read_systems
 from rcsc.compose.together.left_open import with_those_together
+from rcsc.driver.watched import claims_of
 from rcsc.front.commands import run
 from rcsc.run.description import description
+from rcsc.run.episodes.episode import BufferFault, Episode
+from rcsc.run.episodes.loop import Loop
+from rcsc.run.episodes.proved.watch import ProvedHolds
+from rcsc.run.episodes.stand import stand
 from tests.across.systems import Drawn, Running, drawn, written
 
 _UP = """\
@@ -204,3 +210,40 @@ def test_many_drawn_levels_keep_as_they_run_what_is_proved_of_them_together(tmp_
         folder.mkdir()
         verdicts += judged(seed, folder, late=seed % 2)
     assert {"together", "alone", "open"} <= set(verdicts)
+
+
+def test_the_page_of_a_requirement_rests_on_what_levels_show_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    named = _SYSTEM.replace("tick_ms", 'requirements = "all.rcs"\ntick_ms')
+    _proved(tmp_path, {"system.toml": named, "all.rcs": "requirement never : always not (low.a and low.b)\n"})
+    page = str(tmp_path / "page.html")
+    assert run(["prove", str(tmp_path / "system.toml"), "--show", "never", "--report", page]) == 0
+    out = capsys.readouterr().out
+    assert "proved as scheduled" in out
+    assert "rests on" not in out
+
+
+_TOGGLES = """\
+class W:
+    go: bool = False
+    x: bool = False
+
+    def step(self, seconds: float) -> None:
+        self.go = not self.go
+"""
+
+
+def test_episodes_watch_what_levels_show_together_until_a_buffer_is_late(tmp_path: Path) -> None:
+    _proved(tmp_path, {"system.toml": _SYSTEM + '[plant]\npython = "w.py"\n', "w.py": _TOGGLES})
+    path = tmp_path / "system.toml"
+    systems, _ = read_systems(path)
+    make((ts.program for ts in systems.values()), tmp_path / "generated", altered=False)
+    claims, at = claims_of(path, None), stand(path)
+    assert ("low", "ASSUMPTION", "not_both") in [(one.level, one.kind, one.name) for one in claims.every]
+    assert not ProvedHolds(claims, at).unwatched
+    late = BufferFault("up.a", "late", 0, 9, ticks=1)
+    assert not Loop(Episode(ticks=12, executor="python"), at, claims).finish().findings
+    [found] = Loop(Episode(harms=(late,), ticks=12, executor="python"), stand(path), claims).finish().findings
+    assert found.property == "no state-table error"
+    assert "level `low` takes what others give as scheduled (cycle 1)" in found.message

@@ -13,19 +13,21 @@ cycle takes what was given in ticks before it. Nothing here takes for granted th
 (`proof.proved`). The empty buffers before the first tick, and what stands in them where a level begins anew, are the product's.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import Key, Trust, Verdict, closed
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
-from rcsc.compose.invariant.search import LIMITS
+from rcsc.compose.invariant.search import LIMITS, Effort
 from rcsc.compose.proof.assume_guarantee import admitted, agreements, claims
 from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, ProvedTogether, confirm_owed
-from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.proof.system import SystemProof, prove_transition_systems
 from rcsc.compose.together.features import features
+from rcsc.compose.together.plain import with_what_is_kept
 from rcsc.compose.together.product import Tick, Timing, Together, together, writers
 from rcsc.compose.together.proof import searched
 from rcsc.lang.resolve.across import stating_nothing
@@ -47,6 +49,34 @@ ASKED = frozenset(
     }
 )
 """Sorts that say the same of a tick in which the level begins anew as of any other."""
+
+
+@dataclass(frozen=True, slots=True)
+class WholeProof:
+    """The proof of all levels of a system.
+
+    Attributes:
+        systems: The levels with what was found of their plain outputs; `alone`, the proof of these, each alone.
+        proof: That, with what levels together show of claims that are open.
+    """
+
+    systems: dict[str, TransitionSystem]
+    alone: SystemProof
+    proof: SystemProof
+
+
+def whole_proof(
+    systems: Mapping[str, TransitionSystem],
+    system: Description,
+    effort: Effort | None = None,
+    jobs: int = 1,
+    done: Callable[[LevelProof], None] | None = None,
+    cache: Cache | None = None,
+) -> WholeProof:
+    """Prove all levels, each alone, and then what that leaves open; call `done` with each."""
+    alone = prove_transition_systems(systems, effort, jobs, tuple(systems), done, cache)
+    more, alone = with_what_is_kept(systems, alone, effort or Effort(), cache)
+    return WholeProof(more, alone, with_those_together(more, system, alone))
 
 
 def with_those_together(

@@ -19,10 +19,8 @@ from rcsc.compose.counterexample.consequence import spelled_leaves, told
 from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain
 from rcsc.compose.counterexample.finding import TimeLineRow, beginnings, rows
 from rcsc.compose.counterexample.trace import usual_length
-from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
-from rcsc.compose.together.left_open import with_those_together
-from rcsc.compose.together.plain import with_what_is_kept
+from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.repeated import answers
 from rcsc.compose.together.said import said, state
 from rcsc.driver import check as checking
@@ -238,10 +236,11 @@ def prove(
         raise KeyError(unknown[0])
     begins = starts(systems, where)
     kept = open_cache(path.parent) if cache else None
-    proof = prove_transition_systems(systems, None, jobs, tuple(levels) or tuple(systems), cache=kept)
-    if not levels:
-        systems, proof = with_what_is_kept(systems, proof, Effort(), kept)
-        proof = with_those_together(systems, description(path), proof)
+    if levels:
+        proof = prove_transition_systems(systems, None, jobs, tuple(levels), cache=kept)
+    else:
+        whole = whole_proof(systems, description(path), jobs=jobs, cache=kept)
+        systems, proof = whole.systems, whole.proof
     most = usual_length(systems.values()) if cycles is None else cycles
     settings = TraceSettings(description(path), most, further=follow, starts=begins)
     runs = explain(systems, proof, settings)

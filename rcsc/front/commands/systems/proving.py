@@ -38,8 +38,7 @@ from rcsc.compose.proof.system import (
     prove_transition_systems,
     read_systems,
 )
-from rcsc.compose.together.left_open import with_those_together
-from rcsc.compose.together.plain import with_what_is_kept
+from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.repeated import Answers, answers
 from rcsc.driver.outline import keep_lines
 from rcsc.driver.requirements import Read
@@ -131,15 +130,14 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
     with _LevelProgress(names, wanted=asked.progress) as done:
         jobs = asked.jobs or (cores() if large else 1)
-        proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
-    if not asked.only and not asked.variants:
-        systems, proof = with_what_is_kept(systems, proof, effort, cache)
+        if asked.only or asked.variants:
+            alone = proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
+        else:
+            whole = whole_proof(systems, settings.system, effort, jobs, done, cache)
+            systems, alone, proof = whole.systems, whole.alone, whole.proof
     if asked.certificate is not None:
-        _write(asked.certificate, systems, proof)
-    alone, given = proof, None
-    if not asked.only and not asked.variants:
-        proof = with_those_together(systems, settings.system, alone)
-        given = _across(systems, proof, settings, cache, asked)
+        _write(asked.certificate, systems, alone)
+    given = None if asked.only or asked.variants else _across(systems, proof, settings, cache, asked)
     if given is not None:
         sources |= given.loaded.sources
         loaded = {**loaded, ACROSS: given.loaded}
@@ -232,9 +230,10 @@ def paged(path: Path, name: str, page: Path, length: int | None, cache: Cache | 
     from rcsc.run.log.read import read as read_log  # of an extra
     from rcsc.views.pages.requirement_page import write_requirement
 
-    systems = read_systems(path)[0]
-    its = replace(read(path, cache), systems=systems)
-    whole = prove_transition_systems(systems, None, 1, tuple(systems), None, cache)
+    its = read(path, cache)
+    proved_ = whole_proof(read_systems(path)[0], its.described, cache=cache)
+    systems, whole = proved_.systems, proved_.proof
+    its = replace(its, systems=systems)
     usual = usual_length(systems.values()) if length is None else length
     try:
         with scratch("page") as folder:

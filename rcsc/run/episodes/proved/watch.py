@@ -25,6 +25,7 @@ from rcsc.run.episodes.proved.checks import CannotWatch, Check, check_of, contra
 from rcsc.run.episodes.proved.claims import (
     ASSUMED,
     RESTARTS,
+    AcrossClaim,
     Claim,
     Claims,
     ProvedLevel,
@@ -153,6 +154,8 @@ def _reader(level: ProvedLevel, stand: Stand) -> Reader:
 
 MEANWHILE = frozenset({"ANSWERS", "RESTS", "STILL", "EXTERNS_FINITE", "NOT_FOR_EVER", "STATES"})
 """Kinds that no cycle alone can break."""
+SCHEDULES = frozenset({"SCHEDULED", "LATE"})
+"""Kinds that a buffer between levels breaks which does not come as scheduled."""
 
 
 class _Trusts:
@@ -167,10 +170,10 @@ class _Trusts:
         self.broken: dict[Trusted, str] = {}
         self._of: dict[str, list[tuple[Trusted, Check]]] = {name: [] for name in readers}
         levels = {level.name: level for level in claims.levels}
-        self._whole = tuple(dict.fromkeys(trust for claim in claims.across for trust in claim.trusts))
-        for trusted in dict.fromkeys(
-            (*(trust for claim in claims.every for trust in claim.trusts), *self._whole)
-        ):
+        stated: tuple[Claim | AcrossClaim, ...] = (*claims.every, *claims.across)
+        every = dict.fromkeys(trust for claim in stated for trust in claim.trusts)
+        self._whole = tuple(trust for trust in every if trust.kind in {*SCHEDULES, RESTARTS, ASSUMED})
+        for trusted in every:
             for name, check in _looked_at(trusted, levels, readers, stand):
                 self._of[name].append((trusted, check))
 
@@ -185,7 +188,8 @@ class _Trusts:
         assumed = {stated.name for stated, _ in cycle.broken if stated.assumed}
         for trusted in self._whole:
             begins = trusted.kind == RESTARTS and cycle.restarted
-            if begins or (trusted.kind == ASSUMED and trusted.name in assumed):
+            late = trusted.kind in SCHEDULES and cycle.unscheduled
+            if begins or late or (trusted.kind == ASSUMED and trusted.name in assumed):
                 self.broken.setdefault(trusted, f"cycle {cycle.tick}")
 
 
@@ -194,7 +198,7 @@ def _known(trusted: Trusted) -> bool:
     return (
         trusted.kind in _MAKERS
         or trusted.kind in MEANWHILE
-        or trusted.kind in {"PROTOCOL", RESTARTS, ASSUMED}
+        or trusted.kind in {"PROTOCOL", RESTARTS, ASSUMED, *SCHEDULES}
     )
 
 
