@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.obligations import command_stays
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
 from rcsc.compose.proof import ranking
@@ -485,6 +486,19 @@ def test_what_ends_goes_nowhere_round(tmp_path: Path) -> None:
     real = lasso(far, "go")
     assert isinstance(real, NotReproducedError)
     assert real.guessed
+
+
+def test_each_cycle_is_put_in_a_lap_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many laps end with it: each length looked at adds the conditions of one cycle, not of all before."""
+    made = list[Cycle]()
+
+    def stays(ts: TransitionSystem, cycle: Cycle) -> Node:
+        made.append(cycle)
+        return command_stays(ts, cycle)
+
+    monkeypatch.setattr("rcsc.compose.counterexample.lasso.command_stays", stays)
+    assert lasso(small_level(tmp_path, "lower", lower=counting(3)), "go") is None
+    assert len(made) == 8
 
 
 def test_order_after_order_goes_round(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ or has answered in all of its cycles, and nothing is refused. The interpreter ru
 second time has to be like the first, with numbers that are as much later.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -53,14 +53,16 @@ def lassos(
     """Find the shortest fair lasso of each table on which its command never completes; the first cycle of a run is in none."""
     run = Unrolled(ts, search)
     by_table: dict[str, Lasso | NotReproducedError] = {}
+    parts: dict[str, list[_Part]] = {table: [] for table in tables}
     for _ in range(search.most):
         waiting = [table for table in tables if table not in by_table]
         if not waiting or run.effort > MOST_EFFORT:
             break
         run.further()
         for table in waiting:
+            parts[table] += (_Part.of(ts, table, cycle) for cycle in run.cycles[len(parts[table]) :])
             starts = range(1, len(run.cycles))
-            every = [comes_round(ts, table, run.cycles[start:]) for start in starts]
+            every = [_comes_round(ts, run.cycles[start:], parts[table][start:]) for start in starts]
             try:
                 if run.reaches(wrong := values.any_of(every)):
                     by_table[table] = _reproduced(ts, table, run, wrong)
@@ -69,34 +71,56 @@ def lassos(
     return by_table
 
 
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What a cycle owes as a part of a lasso of a command, whichever cycles the lasso has besides.
+
+    Attributes:
+        goes: The condition that the cycle goes on with the command; `waits`, that it does not answer it.
+        answered: For each subordinate the condition that it has answered.
+    """
+
+    goes: Node
+    waits: Node
+    answered: tuple[Node, ...]
+
+    @classmethod
+    def of(cls, ts: TransitionSystem, table: str, cycle: Cycle) -> "_Part":
+        """Return that of a cycle in which the command's table is to run."""
+        chosen = next(at.chosen for at in cycle.tables if at.table.name == table)
+        refused = values.negation(cycle.refused)
+        goes = values.all_of((cycle.contract, cycle.goes_on, refused, chosen, command_stays(ts, cycle)))
+        return cls(goes, unanswered(ts, cycle), _answered(ts, cycle))
+
+
 def comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
     """Return the condition that the cycles are a lasso of the table's command."""
+    return _comes_round(ts, cycles, [_Part.of(ts, table, cycle) for cycle in cycles])
+
+
+def _comes_round(ts: TransitionSystem, cycles: Sequence[Cycle], parts: Sequence[_Part]) -> Node:
     first, last = cycles[0], cycles[-1]
-    number = next(at for at, table_at in enumerate(first.tables) if table_at.table.name == table)
-    goes = [
-        values.all_of(
-            (
-                cycle.contract,
-                cycle.goes_on,
-                values.negation(cycle.refused),
-                cycle.tables[number].chosen,
-                command_stays(ts, cycle),
-            )
-        )
-        for cycle in cycles
-    ]
     moving = _moving(ts)
     same = [values.equal(first.before[leaf], last.after[leaf]) for leaf in first.before if leaf not in moving]
-    waits = values.any_of(unanswered(ts, cycle) for cycle in cycles)
-    return values.all_of((*goes, waits, *same, *_due(ts, cycles)))
+    waits = values.any_of(part.waits for part in parts)
+    due = _due(ts, first, last, [part.answered for part in parts])
+    return values.all_of((*(part.goes for part in parts), waits, *same, *due))
 
 
-def _due(ts: TransitionSystem, cycles: Sequence[Cycle]) -> Iterator[Node]:
-    """Yield the conditions that each subordinate gets an order in the cycles, or has answered in all, and that its echo goes on alike."""
-    first, last = cycles[0], cycles[-1]
-    for below in ts.links.below:
+def _answered(ts: TransitionSystem, cycle: Cycle) -> tuple[Node, ...]:
+    return tuple(answered(ts, cycle, below) for below in ts.links.below)
+
+
+def _due(
+    ts: TransitionSystem, first: Cycle, last: Cycle, answers: Iterable[tuple[Node, ...]]
+) -> Iterator[Node]:
+    """Yield that each subordinate gets an order from the first cycle to the last, or has answered in all, and that its echo goes on alike.
+
+    Of each cycle there is given for each subordinate the condition that it has answered.
+    """
+    for below, all_answered in zip(ts.links.below, zip(*answers, strict=True), strict=True):
         ordered = values.negation(values.equal(first.before[below.number], last.after[below.number]))
-        yield values.either(ordered, values.all_of(answered(ts, cycle, below) for cycle in cycles))
+        yield values.either(ordered, values.all_of(all_answered))
         before, after = (
             values.equal(leaves[below.echo], leaves[below.number]) for leaves in (first.before, last.after)
         )
@@ -237,7 +261,7 @@ class _Waiting:
         on = (
             values.equal(later_by(first.before[leaf], by), last.after[leaf]) for leaf in sorted(self.ordered)
         )
-        return values.all_of((*same, *on, *_due(self.ts, cycles)))
+        return values.all_of((*same, *on, *self._due(cycles)))
 
     def is_lasso(self, lasso: Sequence[CycleRun]) -> bool:
         """Return whether cycles that were run are a lasso on which it waits: on values, which is quick where it is long."""
@@ -249,9 +273,10 @@ class _Waiting:
         if not all(step.fault is Fault.OK and holds(self.waits, step.left) for step in lasso):
             return False
         below = self.ts.links.below
-        return not below or _is_true(
-            values.all_of(_due(self.ts, [as_cycle(self.ts, step) for step in lasso]))
-        )
+        return not below or _is_true(values.all_of(self._due([as_cycle(self.ts, step) for step in lasso])))
+
+    def _due(self, cycles: Sequence[Cycle]) -> Iterator[Node]:
+        return _due(self.ts, cycles[0], cycles[-1], (_answered(self.ts, cycle) for cycle in cycles))
 
 
 def waiting_lasso(
