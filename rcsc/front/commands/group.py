@@ -24,36 +24,56 @@ Examples:
 \b
 Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc."""
 
-COMMANDS = {
-    "systems.campaign": "Run many episodes of a system, with faults; shrink what breaks a property.",
-    "tables.certify": "Re-check a proof without the prover.",
-    "tables.check": "Prove that exactly one line of each table matches.",
-    "tables.compile": "Write the executors of proved tables, in Python and C.",
-    "completion": "Print a shell's completion script.",
-    "systems.db": "Build, check and show the cell's database.",
-    "tables.diff": "Show what changed in meaning, and prove that nothing else did.",
-    "tables.evidence": "Make what a safety case asks of the generated C.",
-    "explain": "Say what a code means.",
-    "tables.fmt": "Align tables.",
-    "tables.graph": "Draw a table's state graph.",
-    "systems.log": "Say what a recorded run did.",
-    "tables.lsp": "Serve an editor as tables are typed.",
-    "tables.names": "List the variables of a system: its data dictionary.",
-    "new": "Make a small project.",
-    "systems.prove": "Prove the levels of a system together, for any delay.",
-    "systems.replay": "Run a recorded run again and compare.",
-    "systems.run": "Run a system with its plant, by a script of orders.",
-    "systems.shell": "Run, step and change a system by hand.",
-    "systems.studio": "Open tables, proof, running levels and cell in one page.",
-    "tables.table": "Make a table of a state graph.",
-    "tables.test": "Test the generated executors against the tables.",
-    "tables.trace": "Trace lines to requirements, code, tests and proofs, and code back to lines.",
+BY_TASK = {
+    "Start": {
+        "new": "Make a small project.",
+        "systems.studio": "Open tables, proof, running levels and cell in one page.",
+        "tables.lsp": "Serve an editor as tables are typed.",
+        "completion": "Print a shell's completion script.",
+    },
+    "Tables": {
+        "tables.check": "Prove that exactly one line of each table matches.",
+        "explain": "Say what a code means.",
+        "tables.fmt": "Align tables.",
+        "tables.diff": "Show what changed in meaning, and prove that nothing else did.",
+        "tables.graph": "Draw a table's state graph.",
+        "tables.table": "Make a table of a state graph.",
+    },
+    "Systems": {
+        "systems.prove": "Prove the levels of a system together, for any delay.",
+        "systems.campaign": "Run many episodes of a system, with faults; shrink what breaks a property.",
+        "tables.names": "List the variables of a system: its data dictionary.",
+    },
+    "Run": {
+        "systems.run": "Run a system with its plant, by a script of orders.",
+        "systems.shell": "Run, step and change a system by hand.",
+        "systems.log": "Say what a recorded run did.",
+        "systems.replay": "Run a recorded run again and compare.",
+        "systems.db": "Build, check and show the cell's database.",
+    },
+    "Code": {
+        "tables.compile": "Write the executors of proved tables, in Python and C.",
+        "tables.test": "Test the generated executors against the tables.",
+    },
+    "For a safety case": {
+        "tables.trace": "Trace lines to requirements, code, tests and proofs, and code back to lines.",
+        "tables.evidence": "Make what a safety case asks of the generated C.",
+        "tables.certify": "Re-check a proof without the prover.",
+    },
 }
-"""The module of each command, whose last name is the command's, and what `rcsc --help` says of it."""
+"""Commands by task, as `rcsc --help` lists them: the module of each, whose last name is the command's, and what it does."""
+COMMANDS = {module: summary for commands in BY_TASK.values() for module, summary in commands.items()}
 
 
 class Group(click.Group):
     """Commands by name and summary, each imported when the command line has named it."""
+
+    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by task."""
+        for task, commands in BY_TASK.items():
+            with formatter.section(task):
+                rows = [(module.rpartition(".")[2], summary) for module, summary in commands.items()]
+                formatter.write_dl([(f"{name:10}", summary) for name, summary in rows])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
