@@ -6,6 +6,7 @@ import pytest
 
 import rcsc
 from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import promises
 from rcsc.compose.proof.level import Verdict, prove_level
 from rcsc.compose.proof.system import SystemProof, transition_systems
@@ -409,6 +410,13 @@ def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Pat
     assert (claim.proved, claim.trusts) == (True, words)
     assert trusts(whole, Sort.PROPERTY, "", "bounded") == ()
     assert trusts(whole, Sort.SOME_LINE, "t") == ()
+
+
+def test_lines_that_were_looked_at_with_refusals_are_not_looked_at_without() -> None:
+    """Of a level of which something is proved only without."""
+    proof = prove_level(alone(GUARDED), Effort(walks=1, cycles=10))
+    assert [part.context is None for part in proof.parts] == [False, True]
+    assert (proof.context, proof.looked_admitting) == (proof.parts[0].context, False)
 
 
 def test_with_a_safe_value_the_property_holds_in_a_refused_cycle_too(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.claims import RESTING as RESTS
 from rcsc.compose.contract.environment import Above, _admits, links
-from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
+from rcsc.compose.contract.obligations import Sort, Unstated, command_stays, obligations, pairs, unstated
 from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.compose.contract.watched import opened
@@ -29,7 +29,7 @@ from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
 from rcsc.compose.proof.context import lines_write, never_run
-from rcsc.compose.proof.level import LevelProof, _of_possible, certificate, prove_level
+from rcsc.compose.proof.level import LevelProof, ProvedTogether, _of_possible, certificate, prove_level
 from rcsc.compose.proof.termination import Ending, Flow, answered
 from rcsc.compose.proof.termination import from_outside as outside_inputs
 from rcsc.lang.leaves import parts
@@ -43,6 +43,8 @@ from rcsc.run.description import BadDescription, Description, Wire, description
 from tests.support.programs.systems import (
     LITTLE,
     SYSTEM,
+    TICK,
+    TURNS,
     alone,
     going,
     lower_level,
@@ -212,6 +214,33 @@ def test_claims_of_a_level_rest_on_these_and_no_others(lower: tuple[TransitionSy
         "    rests on the level runs as its tables say,,; the report echoes the command that it answers,,report",
     ]
     assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *stands, *ends]
+
+
+def test_what_a_proof_says_of_a_level_rests_on_these_and_no_others(upper: TransitionSystem) -> None:
+    """What is proved of several levels together rests on each of them, and on nothing else of this one."""
+    goals = obligations(upper, any_cycle(upper))
+    [echoes, late, *_] = [one.key for one in goals if one.sort in (Sort.ECHOES, Sort.WAITS)]
+    proof = LevelProof(
+        "upper",
+        tuple((one, Verdict.PROVED) for one in goals),
+        (),
+        (),
+        walked=0,
+        learnt=0,
+        seconds=0.0,
+        endings=(Ending("work", 1), Ending("rest", 0)),
+        stands=True,
+        together=(ProvedTogether(late, ("upper", "lower"), ("each in its time",)),),
+    )
+    ends = {name: (Sort.ENDS, name, "") for name in ("work", "rest")}
+    told = {key: (claim.rests_on, claim.trusts) for key, claim in of_level(upper, proof)}
+    runs = ("upper", RUNS)
+    assert told[late] == ((runs, ("lower", RUNS)), ("each in its time",))
+    assert told[echoes] == ((runs,), ())
+    assert told[STANDS] == ((runs, ("upper", echoes)), ())
+    assert told[ENDING] == (tuple(("upper", key) for key in ends.values()), ())
+    assert told[RESTS] == ((("upper", ends["rest"]),), ())
+    assert told.keys() == {one.key for one in goals} | {*ends.values(), RUNS, SAFE, STANDS, ENDING, RESTS}
 
 
 def test_a_record_with_several_inputs_is_named_once(upper: TransitionSystem) -> None:
@@ -550,6 +579,26 @@ def test_a_flag_that_turns_while_a_command_waits_is_no_phase(tmp_path: Path) -> 
     assert "flip" in flow._pending_and_flags()
     assert "flip" in flow._phases(0).leaves
     assert "flip" not in flow._phases(1).leaves
+
+
+def test_each_step_of_a_loop_is_to_be_excluded_where_the_table_goes_on_with_its_command(
+    tmp_path: Path,
+) -> None:
+    ts = small_level(tmp_path, "lower", lower=lower_level(*TURNS, **TICK))
+    cycle = any_cycle(ts)
+    flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
+    [step, back] = flow._phases(1).waiting
+    assert (step, back) == (((0,), (1,)), ((1,), (0,)))
+    fresh = (cycle.before["new_command"], cycle.after["new_command"])
+    goes_on = (cycle.tables[1].chosen, command_stays(ts, cycle))
+    for condition, truths in zip(flow.no_loop_steps(), (fresh, fresh[::-1]), strict=True):
+        taken = [values.negation(truths[0]), truths[1], *goes_on]
+        keyed, solver = Keyed(), Solver()
+        solver.add(keyed.term(values.negation(condition)))
+        told = [keyed.term(values.negation(each)) for each in taken]
+        solver.add(*keyed.ranges)
+        assert solver.check() is Answer.SATISFIABLE
+        assert {solver.check(each) for each in told} == {Answer.UNSATISFIABLE}
 
 
 @pytest.mark.parametrize("most", [1, 2, 400])

@@ -11,6 +11,7 @@ import pytest
 
 from rcsc.code.emit import TARGETS
 from rcsc.compose.contract.claims import Verdict
+from rcsc.compose.contract.environment import Above, Below
 from rcsc.compose.contract.obligations import Sort, obligations, unstated
 from rcsc.compose.contract.transition import GHOST, TransitionSystem
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, stopping, traces
@@ -101,6 +102,24 @@ def test_every_field_of_an_order_is_numbered_but_a_declared_stream(tmp_path: Pat
         assert (numbered in {one.key for one in obligations(ts, ts.cycle(ts.havoc()))}) == owed
         if owed:
             edit_file(dock.parent / "words.rcs", ("    target_mm : ", "    stream target_mm : "))
+
+
+def test_who_is_served_and_commanded_is_linked_word_for_word(dock: Path) -> None:
+    """What is neither in an order nor in a report is free, and nothing else is."""
+    edit_file(dock.parent / "words.rcs", ("    target_mm : ", "    stream target_mm : "))
+    systems = transition_systems(dock)
+    fleet = Above("fleet", "fleet", "to_fleet", True, ("fleet.input_command",), done="done", failed="failed")
+    drive = Below(
+        "drive", "to_drive", "from_drive", False, "drive.late", ("drive.command", "drive.status"), False,
+        ("to_drive.target_mm",), done="done", failed="failed",
+    )  # fmt: skip
+    links = systems["supervisor"].links
+    assert (links.above, links.below, links.free) == (fleet, (drive,), ("beacon",))
+    supervisor = Above(
+        "supervisor", "supervisor", "to_supervisor", False, ("supervisor.input_command",), done="done", failed="failed"
+    )  # fmt: skip
+    links = systems["drive"].links
+    assert (links.above, links.below, links.free) == (supervisor, (), ("travelled_mm", "bumper"))
 
 
 @pytest.mark.parametrize(("restart", "left"), [(" restart bad", []), ("", [Sort.FAILED_STAYS])])

@@ -186,14 +186,14 @@ ARITHMETIC: dict[Arithmetic, Callable[[int, int], int]] = {
 }
 
 
-def arithmetic_is_right() -> bool:
+def arithmetic_is_right(most: int = 9) -> bool:
     """Whether products, quotients and remainders of two variables are right for every pair of values but a zero divisor."""
-    kind = Int(-9, 9)
+    kind = Int(-most, most)
     for op, meaning in ARITHMETIC.items():
         gates = Gates()
         node = values.arithmetic(op, tuple(values.variable(name, kind) for name in "ij"), Int(-99, 99))
         result, words = gates.word(node), [gates.named[name] for name in "ij"]
-        for pair in product(range(-9, 10), repeat=2):
+        for pair in product(range(-most, most + 1), repeat=2):
             if op is not Op.MUL and not pair[1]:
                 continue
             bits = {
@@ -212,6 +212,10 @@ def arithmetic_is_right() -> bool:
 
 def test_arithmetic_of_integers_is_exact() -> None:
     assert arithmetic_is_right()
+
+
+def test_arithmetic_of_small_integers_is_exact() -> None:
+    assert arithmetic_is_right(4)
 
 
 @pytest.mark.parametrize(

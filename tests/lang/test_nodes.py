@@ -27,7 +27,7 @@ from rcsc.lang.model import (
     Variable,
     VariableName,
 )
-from rcsc.lang.operator_table import Op, part_way
+from rcsc.lang.operator_table import Arithmetic, Op, part_way
 from rcsc.lang.operator_table import single as to_single
 from rcsc.proof.procedures.discharge import MOST_CHOICES, fewest
 from rcsc.proof.solvers import smt
@@ -35,7 +35,7 @@ from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import trial, values
 from rcsc.proof.symbolic.encode import Frame, declared, encode
-from rcsc.proof.symbolic.keyed import KEY
+from rcsc.proof.symbolic.keyed import KEY, ExactIntegers, Keyed
 from rcsc.proof.symbolic.measured import Measured
 from rcsc.proof.symbolic.values import FALSE, TRUE, Fact, Node
 
@@ -422,6 +422,64 @@ def test_z3_computes_what_the_interpreter_does(
     solver = Solver()
     same = smt.equal(encode(expr, Frame({})), smt.literal(made, evaluate(expr, {})), made)
     assert solver.check(smt.negation(same)) is Answer.UNSATISFIABLE
+
+
+NUMBERS = {
+    Op.NEG: ((-2, 3),), Op.ABS: ((-2, 3),), Op.MIN: ((-2, 1), (-1, 2)), Op.MAX: ((-2, 1), (-1, 2)),
+    Op.ADD: ((-2, 1), (-1, 2)), Op.SUB: ((-2, 1), (-1, 2)), Op.MUL: ((-2, 2), (3, 3)),
+    Op.DIV: ((0, 9), (4, 4)), Op.MOD: ((0, 9), (5, 5)),
+}  # fmt: skip
+"""Operations that are exact for whole numbers of these spans: `mod` takes its divisor away at most once."""
+
+
+@pytest.mark.parametrize("made", [Keyed, ExactIntegers])
+@pytest.mark.parametrize("op", NUMBERS)
+def test_whole_numbers_are_exact_where_they_are_linear_or_wrap_once(
+    made: Callable[[], Keyed], op: Arithmetic
+) -> None:
+    """At each value; all others of any spans lie beside the exact ones (`test_what_is_not_linear_may_be_right`)."""
+    spans = NUMBERS[op]
+    for point in product(*(range(low, high + 1) for low, high in spans)):
+        assert _said_of(made(), op, spans, point) == (True, False)
+
+
+@pytest.mark.parametrize("op", [Op.MUL, Op.DIV, Op.MOD])
+def test_what_is_not_linear_may_be_right(op: Arithmetic) -> None:
+    """A product of two numbers that vary may be any of its bounds; asked exactly, it is what it is."""
+    spans = ((-5, 5), (1, 3))
+    for point in product(*(range(low, high + 1) for low, high in spans)):
+        assert _said_of(Keyed(), op, spans, point) == (True, True)
+        assert _said_of(ExactIntegers(), op, spans, point) == (True, False)
+
+
+def _said_of(
+    keyed: Keyed, op: Arithmetic, spans: Sequence[tuple[int, int]], point: Sequence[int]
+) -> tuple[bool, bool]:
+    """Whether the result may be what the interpreter computes at these operands, and whether it may be anything else."""
+    operands = [number(f"n{at}", low, high) for at, (low, high) in enumerate(spans)]
+    node = values.arithmetic(op, operands, Int(-99, 99))
+    expr = Apply(op, tuple(Literal(value, Int(-9, 9)) for value in point), Int(-99, 99))
+    right = keyed.equal(keyed.literal(Int(-99, 99), evaluate(expr, {})), node)
+    at = [
+        keyed.equal(keyed.literal(Int(-9, 9), value), each)
+        for value, each in zip(point, operands, strict=True)
+    ]
+    solver = Solver()
+    solver.add(*keyed.ranges, *at)
+    may = (solver.check(right), solver.check(smt.negation(right)))
+    return may[0] is Answer.SATISFIABLE, may[1] is Answer.SATISFIABLE
+
+
+def test_the_value_at_a_point_is_what_the_operations_make_of_it() -> None:
+    total = values.arithmetic(
+        Op.ADD, (N, values.arithmetic(Op.MUL, (M, whole(3)), Int(-99, 99))), Int(-99, 99)
+    )
+    chosen = values.choice(values.compare(Op.LT, total, whole(4)), total, M)
+    for n, m in product(range(-3, 10), range(6)):
+        made = n + 3 * m
+        assert trial.value_at(chosen, {"n": n, "m": m}) == (made if made < 4 else m)
+    part = values.arithmetic(Op.DIV, (N, M), Int(-9, 9))
+    assert [trial.value_at(part, {"n": 9, "m": m}) for m in (0, 2)] == [None, 4]
 
 
 def test_a_constant_that_nothing_bounds_has_some_value_in_a_model() -> None:

@@ -445,6 +445,11 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
     assert Code.SOLVERS_DISAGREE in {finding.code for finding in verdict.findings}
 
 
+def test_z3_need_not_say_whether_default_runs_where_no_gap_is_told() -> None:
+    program = program_of(written([["x", "", "", "<= 0"], ["y", "", "", "> 1"], ["d", "DEFAULT", "", ""]]))
+    assert confirm(program, program.tables[0], (), Options()) is Agreement.AGREES
+
+
 STATED = 2 * confirming._OF_A_CELL
 """What it costs to put the two conditions of these tables into Z3's words."""
 

@@ -664,6 +664,26 @@ def test_what_may_be_undefined_is_told_in_the_line_where_it_can_be(
     assert told(head, *rows, "| else | DEFAULT || 0 |", "}") == told(VAST, *procedures)
 
 
+def test_a_condition_of_two_lines_is_told_in_the_one_that_its_witness_lets_match() -> None:
+    """At the part that is wrong."""
+    text = """enum mode { small, large }
+input m : mode
+input a : int 0 .. 9_000_000_000
+assume fits assumed : m = small implies a < 10
+table t assuming fits {
+| line  | m     | when ||
+|-------|-------|------||
+| small | small | a < 7 or a * a > 5 ||
+| large | large | a < 7 or a * a > 5 ||
+}
+"""
+    program = program_of(text)
+    [found] = Obligations(program, BOXES).prove(program.tables)
+    span = found.primary.span
+    assert text[span.start : span.end] == "a * a"
+    assert text[: span.start].rpartition("\n")[2] == "| large | large | a < 7 or "
+
+
 @settings(max_examples=20, deadline=None)
 @given(
     st.lists(st.sampled_from(["small", "large", "off"]), min_size=1, max_size=2, unique=True),

@@ -57,6 +57,7 @@ from rcsc.proof.table.regions.linear import Simplex, integer_point, least_point
 from rcsc.proof.table.regions.points import projected
 from rcsc.proof.table.regions.region import (
     Bounds,
+    Candidate,
     Counted,
     Empty,
     Node,
@@ -556,12 +557,35 @@ def test_a_comparison_of_what_may_be_infinite_is_one_truth() -> None:
     assert search.proved
 
 
-def test_what_holds_everywhere_is_in_the_way_of_no_count() -> None:
+@pytest.mark.parametrize(
+    ("more", "other"),
+    [
+        ("x /= 5", "x = 5"),
+        ("x in {1, 5, 7}", "x not in {1, 5, 7}"),
+        ("(x = 1 or y = 2)", "x /= 1 and y /= 2"),
+        ("(x = 1 or x + y = 2)", "x /= 1 and x + y /= 2"),
+    ],
+)
+def test_what_holds_everywhere_is_in_the_way_of_no_count(more: str, other: str) -> None:
+    """It is left out, and the rest of its line is not."""
     program = compiled(
         "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n"
-        "| a | (x < y or x >= y) and x /= 5 ||\n| b | x = 5 ||\n}\n"
+        f"| a | (x < y or x >= y) and {more} ||\n| b | {other} ||\n}}\n"
     )
     assert searched(program)[1].proved
+
+
+def test_of_what_a_line_leaves_open_a_box_that_is_all_of_its_range_is_left_out_and_no_other() -> None:
+    universe, _ = searched(
+        compiled(
+            "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | x | y ||\n| a | < 5 | < 5 ||\n}\n"
+        )
+    )
+    tree = Tree(universe, [], [], lambda _: NoWitness.UNKNOWN, default=True)
+    whole, half = ((0, 9),), ((0, 4),)
+    for boxes, left in (({0: whole, 1: half}, {1: half}), ({0: half, 1: half}, None), ({0: whole}, {})):
+        line = Candidate(3, boxes, ())
+        assert tree._dropped(tree.root, line) == (line if left is None else Candidate(3, left, ()))
 
 
 @pytest.mark.parametrize("known", [{0: 3, 1: 4}, None])
@@ -661,14 +685,18 @@ def test_an_input_that_shows_no_further_pair_ends_the_search_for_these(
     assert decision.others(Question((), (0, 1)), frozenset()) == set()
 
 
-@pytest.mark.parametrize(("needed", "only"), [("x * y < 20", True), ("x * x < 20", False)])
+@pytest.mark.parametrize(
+    ("needed", "other", "only"),
+    [("x * y < 20", ">= 20", True), ("x * x < 20", ">= 100", False), ("x * x < 20", "= 79", False)],
+)
 def test_a_line_is_told_apart_that_only_an_assumption_excludes_though_it_is_not_linear(
-    needed: str, only: bool
+    needed: str, other: str, only: bool
 ) -> None:
+    """As it is where only the solver knows that no input matches: 79 is a prime."""
     decision = deciding(
         f"input x : int 0 .. 9\ninput y : int 0 .. 9\nassume small assumed : {needed}\n"
         "table t assuming small {\n| line | when ||\n"
-        f"| a | x * y < 20 ||\n| b | x * y {'>= 20' if only else '>= 100'} ||\n}}\n"
+        f"| a | x * y < 20 ||\n| b | x * y {other} ||\n}}\n"
     )
     assert decision.dead() == [DeadLine(1, only)]
 
@@ -680,6 +708,20 @@ def test_a_region_reaches_below_its_input_where_an_assumption_allows_that() -> N
     )
     [found] = [each for each in decision.decided().findings if isinstance(each, Overlap)]
     assert (found.witness, found.region) == ({"x": 0, "y": 5}, {})
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "most"),
+    [("real 0.0 .. 1.0", 0.5, 0.75), ("single 0.0 .. 1.0", 0.5, 0.75), ("int 0 .. 9", 5, 7)],
+)
+def test_a_gap_that_an_assumption_allows_is_told_at_its_witness(kind: str, value: Value, most: Value) -> None:
+    """It is tried at its own value alone: 0 is allowed, too, and no gap."""
+    decision = deciding(
+        f"input x : {kind}\nassume some assumed : x <= {most}\n"
+        f"table t assuming some {{\n| line | when ||\n| a | x < {value} ||\n| d | DEFAULT ||\n}}\n"
+    )
+    gap = Gap(({"x": value},), (None,))
+    assert decision.narrowed_gap(gap) == [gap]
 
 
 @pytest.mark.parametrize(

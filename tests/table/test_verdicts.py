@@ -512,6 +512,8 @@ level l {{ period 40 [ms] {level} }}
         "tables `first` and `second` of level `l` run in one cycle, and assume what cannot hold together"
     ]
     assert [label.message for label in told[0].related] == ["assumed", "assumed"]
+    declared = program_of(text("n <= 2", "n >= 7", both)).assumptions
+    assert [label.span for label in told[0].related] == [each.span for each in declared]
     for low, high in (("n <= 2", "n <= 1"), ("n <= 2", "m >= 7")):
         assert Code.CONTRADICTORY_ASSUMPTIONS not in [each.code for each in reported(text(low, high, both))]
     alone = reported(text("n < 1 and n > 2", "n >= 7", both))
