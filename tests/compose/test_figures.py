@@ -25,11 +25,12 @@ from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.compose.contract.watched import opened
 from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.search import Effort, FoundInvariant
 from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
 from rcsc.compose.proof.context import lines_write, never_run
-from rcsc.compose.proof.level import LevelProof, ProvedTogether, _of_possible, certificate, prove_level
+from rcsc.compose.proof.level import LevelProof, ProvedTogether, _of_possible, certificate, prove_again, prove_level
 from rcsc.compose.proof.termination import Ending, Flow, answered
 from rcsc.compose.proof.termination import from_outside as outside_inputs
 from rcsc.lang.leaves import parts
@@ -262,6 +263,21 @@ def test_what_needs_that_no_input_is_refused_trusts_that(
         claimed = [each for each in of_level(ts, replace(proof, parts=parts_)) if each[0] not in resting]
         assert len(claimed) > len(proof.verdicts)
         assert [key for key, claim in claimed if (words in claim.trusts) is not trusted] == []
+
+
+def test_a_level_is_proved_again_with_the_clauses_that_it_has() -> None:
+    """Without a walk: what a clause speaks of and what it says is known."""
+    ts = alone(
+        "input a : bool\nstate n : int 0 .. 9\nstate m : int 0 .. 9\n"
+        "module count reads a, n, m writes n, m { if a and n < 9 { n := n + 1  m := min(m + 1, 9) } }\n"
+        "table t {\n| line | a ||\n| any | ||\n}\nproperty alike : n = m\nproperty far : n < 9 or m = 9\n"
+        "level solo { period 40 [ms] preprocess count table t }\n"
+    )
+    proof = prove_level(ts, Effort(walks=2, cycles=20))
+    again = prove_again(ts, proof, Effort(walks=0, cycles=0, looks=False))
+    assert (proof.open, again.open, again.walked) == ((), (), 0)
+    names = [FoundInvariant(each.predicates, each.clauses).named for each in (proof, again)]
+    assert names[0] == names[1] != ()
 
 
 def test_a_leaf_that_is_written_before_and_after_the_lines_is_an_effect_of_theirs() -> None:

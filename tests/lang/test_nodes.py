@@ -482,6 +482,13 @@ def test_the_value_at_a_point_is_what_the_operations_make_of_it() -> None:
     assert [trial.value_at(part, {"n": 9, "m": m}) for m in (0, 2)] == [None, 4]
 
 
+def test_z3_has_no_more_memory_than_it_is_given() -> None:
+    given_mb = Limits().memory_mb
+    for memory_mb in (given_mb + 1, given_mb):
+        Solver(Limits(memory_mb=memory_mb))
+        assert z3.get_param("memory_max_size") == str(memory_mb)
+
+
 def test_a_constant_that_nothing_bounds_has_some_value_in_a_model() -> None:
     solver = Solver()
     assert solver.check() is Answer.SATISFIABLE

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations, pairwise, permutations, product
+from random import Random
 from typing import Any, Literal
 
 import pytest
@@ -550,6 +551,22 @@ def test_boxes_of_many_intervals_meet_in_few_steps() -> None:
     many: Box = tuple((at, at) for at in range(0, 2_000, 2))
     with counted(30_000):
         assert meet(many, many) == many
+
+
+def test_what_lines_fill_together_is_counted_once_however_many_meet() -> None:
+    """Of five lines of two axes drawn 300 times; the count is exact."""
+    draw, extent = Random(7), (0, 4)
+    for _ in range(300):
+        spans = [[sorted((draw.randint(0, 4), draw.randint(0, 4))) for _ in "xy"] for _ in range(5)]
+        lines = [{name: ((low, high),) for name, (low, high) in zip("xy", line, strict=True)} for line in spans]
+        table = partition.Boxes({"x": extent, "y": extent}, lines)
+        counting = partition.Counting(table, dict(table.meeting()))
+        filled = sum(
+            any(all(low <= key <= high for key, (low, high) in zip(at, line, strict=True)) for line in spans)
+            for at in product(range(5), repeat=2)
+        )
+        assert counting.exact
+        assert sum(piece.sign * piece.sizes[0] for piece in counting.pieces) == filled, spans
 
 
 def test_a_dead_line_meets_none_and_hides_no_other() -> None:
