@@ -15,8 +15,10 @@ from rcsc.compose.contract.claims import (
     Claim,
     Key,
     Promise,
+    Trust,
     Verdict,
     spelled,
+    trust_of,
 )
 from rcsc.compose.contract.claims import RESTING as RESTS
 from rcsc.compose.contract.environment import Above, _admits, links
@@ -30,7 +32,14 @@ from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
 from rcsc.compose.proof.context import lines_write, never_run
-from rcsc.compose.proof.level import LevelProof, ProvedTogether, _of_possible, certificate, prove_again, prove_level
+from rcsc.compose.proof.level import (
+    LevelProof,
+    ProvedTogether,
+    _of_possible,
+    certificate,
+    prove_again,
+    prove_level,
+)
 from rcsc.compose.proof.termination import Ending, Flow, answered
 from rcsc.compose.proof.termination import from_outside as outside_inputs
 from rcsc.lang.leaves import parts
@@ -342,6 +351,18 @@ def test_an_ending_rests_on_those_of_levels_below_and_trusts_those_that_are_none
     )
 
 
+def test_every_trust_is_told_from_the_others() -> None:
+    for trust in Trust:
+        words = trust.value.replace("LEVEL", "some_level").replace("NAME", "record.field")
+        words = words.replace("INPUTS", "`x`, `y.z`").replace("ARE", "are")
+        kind, level, name = trust_of(words)
+        assert kind == trust.name
+        assert (level, name) == (
+            "some_level" * ("LEVEL" in trust.value),
+            "record.field" * ("NAME" in trust.value),
+        )
+
+
 # --- buffers ------------------------------------------------------------------------------
 
 
@@ -605,6 +626,9 @@ def test_each_step_of_a_loop_is_to_be_excluded_where_the_table_goes_on_with_its_
     flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
     [step, back] = flow._phases(1).waiting
     assert (step, back) == (((0,), (1,)), ((1,), (0,)))
+    assert list(flow._loops_in_words(1)) == [
+        "`new_command` = false; `new_command` = true (lines `1`, `2`, `3`)"
+    ]
     fresh = (cycle.before["new_command"], cycle.after["new_command"])
     goes_on = (cycle.tables[1].chosen, command_stays(ts, cycle))
     for condition, truths in zip(flow.no_loop_steps(), (fresh, fresh[::-1]), strict=True):

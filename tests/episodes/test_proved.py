@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.compose.contract.claims import Trust, trust_of
+from rcsc.compose.contract.claims import trust_of
 from rcsc.compose.contract.obligations import Sort
 from rcsc.front.commands import run as rcsc
 from rcsc.run.campaign.summary import watched, watched_text
@@ -463,18 +463,6 @@ def test_every_kind_of_claim_is_seen_broken() -> None:
 def test_every_sort_of_obligation_is_watched() -> None:
     """But those that are several others, that runs of two levels show, or that are about what could come and did not."""
     assert {sort.name for sort in Sort} - WATCHED <= {"PROTOCOL", "SAME_ORDER", "OF_ITS_ORDER", "KEPT"}
-
-
-def test_every_trust_is_told_from_the_others() -> None:
-    for trust in Trust:
-        words = trust.value.replace("LEVEL", "some_level").replace("NAME", "record.field")
-        words = words.replace("INPUTS", "`x`, `y.z`").replace("ARE", "are")
-        kind, level, name = trust_of(words)
-        assert kind == trust.name
-        assert (level, name) == (
-            "some_level" * ("LEVEL" in trust.value),
-            "record.field" * ("NAME" in trust.value),
-        )
 
 
 def test_a_report_with_which_a_level_begins_answers_nothing() -> None:

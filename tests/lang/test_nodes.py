@@ -508,6 +508,18 @@ def test_what_z3_has_of_a_question_that_was_broken_off_is_not_asked_again() -> N
     assert solver._solver is not before
 
 
+def test_a_question_gets_the_steps_that_are_left_when_it_is_asked() -> None:
+    """Also where the solver was asked before, with all of them."""
+    solver = Solver()
+    assert solver.check() is Answer.SATISFIABLE
+    one, other = smt.variable("p", KEY), smt.variable("q", KEY)
+    factors = smt.equal(smt.integer_operation("*", one, other), smt.literal(KEY, 391), KEY)
+    solver.add(factors, smt.below(smt.literal(KEY, 1), one, KEY), smt.below(one, other, KEY))
+    with smt.together(1):
+        assert solver.check() is Answer.UNKNOWN
+    assert solver.check() is Answer.SATISFIABLE
+
+
 def test_a_single_of_a_double_is_followed_as_far_as_it_is_rounded() -> None:
     measured = Measured()
     rounded = measured.term(values.arithmetic(Op.TO_SINGLE, (Y,), Single(0.5, 4.0)))

@@ -558,7 +558,9 @@ def test_what_lines_fill_together_is_counted_once_however_many_meet() -> None:
     draw, extent = Random(7), (0, 4)
     for _ in range(300):
         spans = [[sorted((draw.randint(0, 4), draw.randint(0, 4))) for _ in "xy"] for _ in range(5)]
-        lines = [{name: ((low, high),) for name, (low, high) in zip("xy", line, strict=True)} for line in spans]
+        lines = [
+            {name: ((low, high),) for name, (low, high) in zip("xy", line, strict=True)} for line in spans
+        ]
         table = partition.Boxes({"x": extent, "y": extent}, lines)
         counting = partition.Counting(table, dict(table.meeting()))
         filled = sum(
