@@ -274,6 +274,19 @@ def test_what_needs_that_no_input_is_refused_trusts_that(
         assert [key for key, claim in claimed if (words in claim.trusts) is not trusted] == []
 
 
+def test_a_kept_proof_is_of_one_level_and_of_one_effort(upper: TransitionSystem, tmp_path: Path) -> None:
+    lower = small_level(tmp_path, "lower")
+    efforts = (
+        LITTLE,
+        replace(LITTLE, walks=7),
+        replace(LITTLE, looks=False),
+        replace(LITTLE, limits=Limits(1)),
+    )
+    keys = [system_proof._key(ts, effort) for ts in (upper, lower) for effort in efforts]
+    assert len(set(keys)) == len(keys)
+    assert system_proof._key(upper, replace(LITTLE)) == keys[0]
+
+
 def test_a_level_is_proved_again_with_the_clauses_that_it_has() -> None:
     """Without a walk: what a clause speaks of and what it says is known."""
     ts = alone(
@@ -639,6 +652,18 @@ def test_each_step_of_a_loop_is_to_be_excluded_where_the_table_goes_on_with_its_
         solver.add(*keyed.ranges)
         assert solver.check() is Answer.SATISFIABLE
         assert {solver.check(each) for each in told} == {Answer.UNSATISFIABLE}
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_loop_is_waited_on_only_where_the_command_may_be_unanswered(
+    waits: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ts = small_level(tmp_path, "lower", lower=lower_level(*TURNS, **TICK))
+    cycle = any_cycle(ts)
+    flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
+    monkeypatch.setattr(termination, "unanswered", lambda *_: values.truth(waits))
+    assert flow._phases(1).loops == (({(0,), (1,)}, waits),)
+    assert flow._phases(1).changes == (None if waits else 0)
 
 
 @pytest.mark.parametrize("most", [1, 2, 400])

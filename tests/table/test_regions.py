@@ -725,6 +725,22 @@ def test_a_gap_that_an_assumption_allows_is_told_at_its_witness(kind: str, value
 
 
 @pytest.mark.parametrize(
+    ("allowed", "line", "least_"),
+    [("x + y >= 3", "x + y = 3", {"x": 0, "y": 4}), ("x * y >= 9", "x * y = 9", {"x": 2, "y": 5})],
+)
+def test_a_gap_whose_witnesses_no_assumption_allows_is_looked_for_anew(
+    allowed: str, line: str, least_: dict[str, Value]
+) -> None:
+    decision = deciding(
+        f"input x : int 0 .. 9\ninput y : int 0 .. 9\nassume some assumed : {allowed}\n"
+        f"table t assuming some {{\n| line | when ||\n| a | {line} ||\n| d | DEFAULT ||\n}}\n"
+    )
+    [found] = decision.narrowed_gap(Gap(({"x": 0, "y": 0}, {"x": 1, "y": 1}), (None, None)))
+    assert isinstance(found, Gap)
+    assert found.witnesses == (least_,)
+
+
+@pytest.mark.parametrize(
     ("more", "asked"), [("x + y < 1 and x > 3", False), ("x * y = 7 and (x + 1) * y = 9 + y", True)]
 )
 def test_of_a_contradiction_it_is_told_whether_the_solver_was_asked(more: str, asked: bool) -> None:
