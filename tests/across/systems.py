@@ -5,8 +5,7 @@ restarts levels as `run.adopt` does, publishes what stands outside, and steps mo
 """
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -15,16 +14,11 @@ from typing import Any
 from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import read_systems
 from rcsc.compose.together.words import stated_across
-from rcsc.lang.model import Program, Property, earlier
-from rcsc.lang.over_time.past import negation
-from rcsc.lang.over_time.run import Watch
+from rcsc.lang.model import Program
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, description
-from rcsc.run.levels import StateTableError, running_level
+from rcsc.run.levels import running_level
 from rcsc.run.system import System, executors, signatures
-
-MOST_TICKS, MOST_LISTED = 5_000, 15_000
-"""Ticks that are run for one requirement: what is longer stays open; and where all states are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +158,6 @@ class Running:
     described: Description = field(init=False)
     program: Program = field(init=False)
     inputs: dict[str, tuple[Any, ...]] = field(init=False)
-    begins: tuple[Any, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         systems, _ = read_systems(self.path)
@@ -186,201 +179,10 @@ class Running:
             name: (False, True) if "bool" in str(ts.kinds["y"]).lower() else (0, 1, 2, 3)  # 3 is refused
             for name, ts in systems.items()
         }
-        values = tuple(level.values for level in levels)
-        admitted = {level.name: self._inputs(level.name) for level in levels}
-        self.begins = values, ({}, {}, {}), admitted, {}, 0
 
-    def shortest(
-        self, stated: Property, most: int, *, refuses: bool, restarts: bool, late: bool = False
-    ) -> int | None:
-        """Return the number of ticks of the shortest run that breaks a requirement; 0 if none does, None if that is not known.
-
-        Args:
-            stated: The requirement.
-            most: No longer run is looked for.
-            refuses: Whether inputs may be refused; `restarts`, whether levels may begin anew.
-            restarts: Whether levels may begin anew.
-            late: Whether buffers may be seen late.
-        """
-        names = [level.name for level in self.system.levels]
-        watch = Watch(stated) if stated.monitor is not None else None
-        values, held, admitted, _, tick = self.begins
-        begins = (None, (values, held, admitted, {} if watch is None else dict(watch.state), tick))
-        seen, here, ran = {begins[0]}, [begins], 0
-        given = list(product(*(self._given(name, refuses=refuses) for name in names)))
-        again = list(product((False, True), repeat=len(names))) if restarts else [(False,) * len(names)]
-        for tick in range(most):
-            after = []
-            for _, kept in here:
-                due = [kept[-1] * 10 % level.level.period_ms == 0 for level in self.system.levels]
-                for values, anew, by in product(given, again, self._ages(kept, late=late)):
-                    if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
-                        continue  # it begins anew before a cycle of it
-                    ran += 1
-                    if ran > MOST_TICKS:
-                        return None
-                    found = self._step(
-                        kept,
-                        dict(zip(names, values, strict=True)),
-                        dict(zip(names, anew, strict=True)),
-                        watch,
-                        stated,
-                        by,
-                    )
-                    if found is None:
-                        return tick + 1
-                    if found[0] not in seen:
-                        seen.add(found[0])
-                        after.append(found)
-            if not after:
-                return 0
-            here = after
-        return None
-
-    def waits_for_ever(self, stated: Property) -> bool | None:
-        """Return whether some run breaks it, or waits in each tick from some tick on, all of them calm; None if that is not known."""
-        assert stated.monitor is not None
-        watch, names = Watch(stated), [level.name for level in self.system.levels]
-        waits = Watch(replace(stated, condition=negation(stated.monitor.waits)))
-        values, held, admitted, _, tick = self.begins
-        begins: Any = (None, (values, held, admitted, dict(watch.state), tick))
-        seen, here, onward, ran = {begins[0]}, [begins], dict[Any, set[Any]](), 0
-        given = list(product(*(self.inputs[name] for name in names)))
-        while here:
-            key, kept = here.pop()
-            due = [kept[-1] * 10 % level.level.period_ms == 0 for level in self.system.levels]
-            for of, anew in product(given, product((False, True), repeat=len(names))):
-                if any(begins and not runs for begins, runs in zip(anew, due, strict=True)):
-                    continue
-                ran += 1
-                if ran > MOST_LISTED:
-                    return None
-                told = dict(zip(names, of, strict=True)), dict(zip(names, anew, strict=True))
-                found = self._step(kept, *told, watch, stated, {})
-                if found is None:
-                    return True
-                calm = not any(anew) and not any(v == 3 and d for v, d in zip(of, due, strict=True))
-                if calm and self._step(kept, *told, waits, waits.stated, {}) is None:
-                    onward.setdefault(key, set()).add(found[0])
-                if found[0] not in seen:
-                    seen.add(found[0])
-                    here.append(found)
-        while gone := [key for key, targets in onward.items() if not targets & onward.keys()]:
-            for key in gone:
-                del onward[key]
-        return bool(onward)
-
-    def walk(
-        self, stated: Property, seed: int, ticks: int, *, refuses: bool, restarts: bool, late: bool
-    ) -> int:
-        """Run so many ticks with whatever comes; return the tick that breaks the requirement, 0 if none does."""
-        random = Random(seed)  # noqa: S311  # repeatable on purpose
-        watch = Watch(stated) if stated.monitor is not None else None
-        values, held, admitted, _, tick = self.begins
-        kept: Any = (values, held, admitted, {} if watch is None else dict(watch.state), tick)
-        for number in range(1, ticks + 1):
-            levels = self._at(kept).levels
-            given = {level.name: random.choice(self._given(level.name, refuses=refuses)) for level in levels}
-            anew = {
-                level.name: restarts
-                and random.random() < 0.1
-                and self.system.tick * 10 % level.level.period_ms == 0
-                for level in levels
-            }
-            found = self._step(
-                kept, given, anew, watch, stated, random.choice(tuple(self._ages(kept, late=late)))
-            )
-            if found is None:
-                return number
-            kept = found[1]
-        return 0
-
-    def _ages(self, kept: Any, *, late: bool) -> Iterator[dict[str, int]]:
-        """Yield how late each buffer may be seen in the next tick."""
-        before = kept[1][2]
-        names = [wire.source for wire in self.described.wires]
-        every = [
-            range(min(self.memory.most, before.get(name, 0) + 1) + 1) if late else (0,) for name in names
-        ]
-        for ages in product(*every):
-            yield dict(zip(names, ages, strict=True))
-
-    def _given(self, name: str, *, refuses: bool) -> tuple[Any, ...]:
-        return tuple(value for value in self.inputs[name] if refuses or value != 3)
-
-    def _inputs(self, name: str) -> tuple[Any, ...]:
+    def inputs_of(self, name: str) -> tuple[Any, ...]:
         level = self.system.level(name)
         return level.value("x"), level.value("y")
-
-    def _state(self, admitted: dict[str, tuple[Any, ...]], watch: Watch | None, tick: int) -> tuple[Any, Any]:
-        values = tuple(level.values for level in self.system.levels)
-        memory = self.memory
-        held = dict(memory._held), dict(memory.past), dict(memory.by)
-        states = {} if watch is None else dict(watch.state)
-        key = (
-            values,
-            tuple(tuple(sorted(of.items())) for of in held),
-            tuple(sorted(admitted.items())),
-            tuple(states.items()),
-            tick % 6,
-        )
-        return key, (values, held, dict(admitted), states, tick)
-
-    def _at(self, kept: Any) -> System:
-        values, held, _, _, tick = kept
-        for level, of in zip(self.system.levels, values, strict=True):
-            level.put_back(of)
-        self.memory._held, self.memory.past, self.memory.by = map(dict, held)
-        self.system.tick = tick
-        return self.system
-
-    def _seen(self, admitted: Mapping[str, tuple[Any, ...]], given: Mapping[str, Any]) -> dict[str, Any]:
-        seen = dict[str, Any]()
-        for level in self.system.levels:
-            x, y = admitted[level.name]
-            of = {"x": x, "y": y, "n": level.value("n"), "o": level.value("o")}
-            seen |= {f"{level.name}.{leaf}": value for leaf, value in of.items()}
-            seen[f"plant.y_{level.name}"] = given[level.name]
-        return seen
-
-    def _step(
-        self,
-        kept: Any,
-        given: dict[str, Any],
-        anew: dict[str, bool],
-        watch: Watch | None,
-        stated: Property,
-        late: dict[str, int],
-    ) -> tuple[Any, Any] | None:
-        system, (_, (held, *_), admitted, states, tick) = self._at(kept), kept
-        before = self._seen(admitted, {name: held.get(f"plant.y_{name}", (0,))[0] for name in given})
-        for name, value in given.items():
-            system.buffers.publish(f"plant.y_{name}", (value,))
-        self.memory.holds(f"plant.y_{name}" for name in given)
-        self.memory.by = late
-        for name, begins in anew.items():
-            if begins:
-                system.restart(name, written=self.memory.written())
-        with suppress(StateTableError):  # a level was refused an input
-            system.step()
-        self.memory.holds(f"{name}.o" for name in given)
-        system.tick = tick + 1
-        now = dict(admitted)
-        for level in system.levels:
-            if tick * 10 % level.level.period_ms == 0 and not level.fault:
-                now[level.name] = self._inputs(level.name)
-        after = self._seen(now, given)
-        if watch is not None:
-            watch.state = dict(states)
-            if not watch.keeps(before, after):
-                return None
-        else:
-            from rcsc.lang.interpret import holds
-
-            looked = {str(earlier(name)): value for name, value in before.items()}
-            if not holds(stated.condition, {**after, **looked}):
-                return None
-        return self._state(now, watch, tick + 1)
 
 
 def written(made: Drawn, folder: Path) -> Path:

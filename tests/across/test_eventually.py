@@ -1,21 +1,18 @@
 """What eventually comes across levels: within a bound that is proved, or never, on a run that goes round."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
-from random import Random
 
 import pytest
 
 from rcsc.compose.counterexample.explain import TraceSettings
-from rcsc.compose.proof.system import prove_transition_systems, read_systems
+from rcsc.compose.proof.system import read_systems
 from rcsc.compose.together.eventually import COMES_TO_AN_END
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NEVER_LATE, Question
+from rcsc.compose.together.proof import NEVER_LATE
 from rcsc.compose.together.repeated import repeated
 from rcsc.front.commands import run
 from rcsc.run.description import description
-from tests.across.systems import Drawn, Running, drawn, written
 from tests.across.test_across import _answers, _late, _written
 
 _COMES = "requirement comes : when boss.go_left, eventually left.runs\n"
@@ -90,70 +87,3 @@ def test_prove_names_what_it_trusts_and_tells_the_loop(
     run(["prove", path, "--no-cache", "--json"])
     every = {one["name"]: one for one in json.loads(capfd.readouterr().out)["requirements"]}
     assert (every["comes"]["lap"], every["wished"]["lap"] > 0) == (0, True)
-
-
-# --- drawn systems -----------------------------------------------------------------------------
-
-FEW, MOST = 2, 100
-
-
-def _with_what_comes(made: Drawn, seed: int) -> Drawn:
-    """Require that something comes of a drawn system, without a bound."""
-    random = Random(seed)  # noqa: S311  # repeatable on purpose
-
-    def atom() -> str:
-        name = random.choice(made.levels)
-        return random.choice((f"{name}.o", f"{name}.n = {random.randrange(3)}", f"not {name}.o", f"{name}.x"))
-
-    ways = (
-        "when {}, eventually {}",
-        "whenever {}, eventually {} or {}",
-        "eventually {} or {} or {}",
-        "after {}, eventually {}",
-    )
-    said = (random.choice(ways) for _ in range(3))
-    lines = (f"requirement r{at} : {one.format(atom(), atom(), atom())}\n" for at, one in enumerate(said))
-    return replace(made, files={**made.files, "requirements.rcs": "".join(lines)})
-
-
-def judged(seed: int, folder: Path) -> list[str]:
-    """Judge what comes of a drawn system; return the verdicts."""
-    path = written(_with_what_comes(drawn(seed), seed), folder)
-    systems, _ = read_systems(path)
-    whole = prove_transition_systems(systems, None, 1, tuple(systems))
-    proofs = {proof.level: proof for proof in whole.levels}
-    running, verdicts = Running(path), []
-    for stated in running.program.properties:
-        found = Question(systems, running.described, running.program, stated, proofs).answer()
-        told = running.waits_for_ever(stated)
-        assert told in (None, found.refuted) or not (found.proved or found.run), (
-            seed,
-            stated.text,
-            found.by,
-            told,
-        )
-        verdicts.append(
-            "proved"
-            if found.proved
-            else "lasso"
-            if found.lasso
-            else "broken"
-            if found.run
-            else f"open {told}"
-        )
-    return verdicts
-
-
-@pytest.mark.parametrize("seed", range(FEW))
-def test_what_comes_of_drawn_systems_comes_as_they_run(seed: int, tmp_path: Path) -> None:
-    assert judged(seed, tmp_path)
-
-
-@pytest.mark.thorough
-def test_what_comes_of_many_drawn_systems_comes_as_they_run(tmp_path: Path) -> None:
-    verdicts = list[str]()
-    for seed in range(3000, 3000 + MOST):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        verdicts += judged(seed, folder)
-    assert {"proved", "lasso"} <= set(verdicts)

@@ -1,65 +1,159 @@
-"""Drawn systems: what is proved of them no run breaks, what is refuted one does, and the shortest is shown."""
+"""Drawn systems: what is proved of them no run breaks, what is refuted one does, and the shortest is shown; and slips, which are told."""
 
+from collections import Counter
+from contextlib import suppress
 from pathlib import Path
+from random import Random
+from unittest.mock import patch
 
 import pytest
 
-from rcsc.compose.proof.system import prove_transition_systems, read_systems
-from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import Question
-from tests.across.systems import Running, drawn, written
+from rcsc.compose.counterexample.rerun import make
+from rcsc.compose.together.product import Together
+from rcsc.lang.model import Scalar, Value, key_bounds
+from rcsc.proof.symbolic import values
+from rcsc.run.levels import StateTableError, running_level
+from rcsc.run.system import System as Running
+from rcsc.run.system import executors, signatures
+from tests.across import slips
+from tests.across.__main__ import main
+from tests.across.drawn import drawn, written
+from tests.across.held import System, judged
+from tests.across.systems import LateMemory
+from tests.across.truth import Befalls, Now, Runs
 
-FEW, MOST, WALKS, TICKS = 4, 60, 3, 150
-
-
-def judged(seed: int, folder: Path, late: int = 0) -> list[str]:
-    """Judge the requirements of a drawn system, whose buffers may be so late; return the verdicts."""
-    path = written(drawn(seed, late), folder)
-    systems, _ = read_systems(path)
-    whole = prove_transition_systems(systems, None, 1, tuple(systems))
-    proofs = {proof.level: proof for proof in whole.levels}
-    running, verdicts = Running(path), []
-    for stated in running.program.properties:
-        for known in ({}, proofs):  # without what is known of each level, and with it
-            found = Question(systems, running.described, running.program, stated, known).answer()
-            if found.proved:
-                around, lates = found.around, late > 0 and found.timing is not Timing.SCHEDULED
-                here = {"refuses": around.refuses, "restarts": around.restarts, "late": lates}
-                shortest = running.shortest(stated, 12, **here)
-                assert not shortest, (seed, stated.text, found.timing, around, shortest)
-                for walk in range(WALKS):
-                    broken = running.walk(stated, walk, TICKS, **here)
-                    assert not broken, (seed, stated.text, found.timing, around, walk, broken)
-                verdicts.append(f"proved {found.timing.value}")
-            if found.run:
-                assert found.broken_in is not None
-                around = found.broken_in
-                shortest = running.shortest(
-                    stated, len(found.run), refuses=around.refuses, restarts=around.restarts, late=late > 0
-                )
-                assert shortest in (len(found.run), None), (seed, stated.text, len(found.run), shortest)
-                verdicts.append("refuted")
-            if not found.proved and not found.run:
-                verdicts.append("open")
-    return verdicts
+QUICK = (1, 4, 5, 14, 35, 53)
+"""Systems that are quickly answered: with what comes, orders, longer periods, refusals, late buffers."""
+MOST, TICKS = 400, 20
 
 
-@pytest.mark.parametrize("seed", range(FEW))
+@pytest.mark.parametrize("seed", QUICK)
 def test_drawn_systems_are_judged_as_they_run(seed: int, tmp_path: Path) -> None:
-    assert judged(seed, tmp_path)
-
-
-@pytest.mark.parametrize("seed", [50, 54])
-def test_drawn_systems_with_late_buffers_are_judged_as_they_run(seed: int, tmp_path: Path) -> None:
-    assert judged(seed, tmp_path, late=1)
+    assert judged(seed, tmp_path, proofs=5)
 
 
 @pytest.mark.thorough
 def test_many_drawn_systems_are_judged_as_they_run(tmp_path: Path) -> None:
-    verdicts = []
+    verdicts = Counter[str]()
     for seed in range(1000, 1000 + MOST):
-        folder = tmp_path / str(seed)
-        folder.mkdir()
-        verdicts += judged(seed, folder, late=seed % 3)
-    assert {"proved any", "proved late", "proved scheduled", "refuted"} <= set(verdicts)
-    assert verdicts.count("open") * 10 < len(verdicts)
+        (tmp_path / str(seed)).mkdir()
+        verdicts.update(judged(seed, tmp_path / str(seed), proofs=8))
+    assert {"proved any", "proved late", "proved scheduled", "refuted", "waits for ever", "vacuous"} <= {
+        *verdicts
+    }
+    assert verdicts["open"] * 20 < verdicts.total()
+    assert not verdicts["open, and a run breaks it"]
+
+
+def test_every_part_is_drawn() -> None:
+    parts = Counter(part for seed in range(200) for part in drawn(seed).parts)
+    assert set(parts) == {
+        "a level twice", "a longer period", "assumed", "clamped", "late buffers", "one output outside to several readers",
+        "one output to several readers", "orders", "refused", "restart", "safe",
+    }  # fmt: skip
+    assert min(parts.values()) > 5
+
+
+# --- the judge itself --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [4, 14, 17, 21])
+def test_the_runs_of_the_judge_are_those_of_the_executors(seed: int, tmp_path: Path) -> None:
+    """With restarts in any tick, refused inputs, and late buffers."""
+    it, random = System.of(written(drawn(seed), tmp_path)), Random(seed)  # noqa: S311  # repeatable on purpose
+    late = it.description.late_ticks
+    runs = Runs(
+        it.systems,
+        it.description,
+        it.program,
+        it.program.properties[0],
+        Befalls(late=late),
+        it.cycles,
+        [*it.systems],
+    )
+    running = _running(it)
+    memory = running.buffers
+    assert isinstance(memory, LateMemory)
+    sources = {wire.source for wire in it.description.wires}
+    outside = {source for source in sources if source.partition(".")[0] not in it.systems}
+    ages, here = dict.fromkeys(sources, 0), {runs.begun()}
+    for tick in range(TICKS):
+        for source in sorted(outside):
+            memory.publish(source, tuple(_any(random, kind) for kind in _kinds(it, source)))
+        memory.holds(outside)
+        memory.by = ages = {one: random.randint(0, min(late, ages[one] + 1)) for one in sorted(sources)}
+        for name in it.systems:
+            if random.random() < 0.15:
+                running.restart(name, written=memory.written())
+        due = [tick % member.period == 0 for member in runs.members]
+        with suppress(StateTableError):
+            running.step()
+        running.tick = tick + 1
+        memory.holds(sources - outside)
+        left = {name: level.values for name, level in zip(runs.names, running.levels, strict=True)}
+        if tick == 0:
+            stood = dict(left)
+        stood |= {name: left[name] for name, ran in zip(runs.names, due, strict=True) if ran}
+        here = {
+            after for at in here for after, _ in runs.onward(at) if _same(runs, runs.states[after], stood)
+        }
+        assert here, (tick, stood)
+
+
+def _running(it: System) -> Running:
+    make((ts.program for ts in it.systems.values()), it.description.generated, altered=False)
+    signs = signatures(it.description)
+    by_level = executors(it.description, signs, "python")
+    levels = tuple(
+        running_level(spec, it.description, signs[spec.name], by_level[spec.name], {})
+        for spec in it.description.levels
+    )
+    return Running(it.description, levels, (), LateMemory(it.description.late_ticks))
+
+
+def _kinds(it: System, source: str) -> list[Scalar]:
+    wire = next(wire for wire in it.description.wires if wire.source == source)
+    reader, _, variable = wire.target.partition(".")
+    return [it.systems[reader].kinds[variable]]
+
+
+def _any(random: Random, kind: Scalar) -> Value:
+    low, high = key_bounds(kind)
+    if high == 1:
+        return random.random() < 0.5
+    value: Value = random.randint(low, high + 1)  # the last is refused
+    return value
+
+
+def _same(runs: Runs, now: Now, stood: dict[str, tuple[Value, ...]]) -> bool:
+    """Return whether a state is the one that executors left, but for numbers of orders, and outputs that nobody looks at."""
+    for name, member, stand in zip(runs.names, runs.members, now.levels, strict=True):
+        leaves = dict(zip((str(v.name) for v in member.ts.program.variables), stood[name], strict=False))
+        for at, leaf in enumerate(member.own):
+            if at not in member.numbers and at not in member.forgotten and stand.own[at] != leaves[leaf]:
+                return False
+    return True
+
+
+def never(*_: object) -> values.Node:
+    return values.FALSE
+
+
+@pytest.mark.parametrize(("place", "seed"), [("_due", 1), ("_never_back", 21)])
+def test_faults_are_noticed(place: str, seed: int) -> None:
+    with patch.object(Together, place, never):
+        assert main(["--count", "1", "--seed", str(seed), "--kind", "required"]) == 1
+
+
+# --- slips -------------------------------------------------------------------------------------
+
+
+def test_a_slip_is_told_or_changes_nothing(tmp_path: Path) -> None:
+    became = {one.partition(": ")[2] for one in slips.judged(12, tmp_path)}
+    assert became == {slips.TOLD, slips.EQUIVALENT}
+
+
+def test_each_kind_of_slip_is_made() -> None:
+    assert {what for seed in range(30) for what, _ in slips.slips(drawn(seed))} == {
+        "wire cut", "output to nobody", "two wires swapped", "two levels swapped", "period doubled", "a requirement's levels exchanged",
+    }  # fmt: skip

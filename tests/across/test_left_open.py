@@ -19,7 +19,9 @@ from rcsc.run.episodes.episode import BufferFault, Episode
 from rcsc.run.episodes.loop import Loop
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import stand
-from tests.across.systems import Drawn, Running, drawn, written
+from tests.across.held import System
+from tests.across.systems import Drawn, drawn, written
+from tests.across.truth import Befalls, Runs, TooManyError, truth
 
 _UP = """\
 input go : bool
@@ -180,8 +182,8 @@ def judged(seed: int, folder: Path, late: int = 0) -> list[str]:
     systems, _ = read_systems(path)
     alone = prove_transition_systems(systems, None, 1, tuple(systems))
     whole = with_those_together(systems, description(path), alone)
-    running, verdicts = Running(path), []
-    for stated in running.program.properties:
+    it, verdicts = System.of(path), list[str]()
+    for stated in it.program.properties:
         key = (Sort.PROPERTY, "", stated.name)
         claim, first = whole.of("a", key), next(iter(whole.levels))
         if not claim.proved:
@@ -189,10 +191,13 @@ def judged(seed: int, folder: Path, late: int = 0) -> list[str]:
             continue
         admits = any("never refused" in trust for trust in claim.trusts)
         lates = late > 0 and not any("as scheduled" in trust for trust in claim.trusts)
-        here = {"refuses": not admits, "restarts": True, "late": lates}
-        shortest = running.shortest(stated, 8, **here)
-        assert not shortest, (seed, stated.text, claim.trusts, shortest)
-        assert not running.walk(stated, seed, 300, **here), (seed, stated.text, claim.trusts)
+        befalls = Befalls(refuses=not admits, late=late if lates else 0)
+        try:
+            true = truth(Runs(it.systems, it.description, it.program, stated, befalls, it.cycles))
+        except TooManyError:
+            verdicts.append("too many runs")
+            continue
+        assert not true.least, (seed, stated.text, claim.trusts, true.least)
         verdicts.append("together" if key in {one.key for one in first.together} else "alone")
     return verdicts
 

@@ -173,7 +173,7 @@ def test_a_watch_reads_what_the_judge_of_the_proof_reads(seed: int, tmp_path: Pa
     signs = {level.name: level.sign for level in system.levels}
     live = AcrossWatch.of(program.stated, running.described, signs)
     judge = {stated.name: Watch(stated) for stated in program.stated}
-    took, held = {name: running._inputs(name) for name in signs}, dict.fromkeys(signs, 0)
+    took, held = {name: running.inputs_of(name) for name in signs}, dict.fromkeys(signs, 0)
     stood = {name: (level.value("n"), level.value("o")) for name in signs for level in (system.level(name),)}
     expected, seen = list[tuple[int, str]](), list[tuple[int, str]]()
     for level in system.levels:
@@ -193,7 +193,7 @@ def test_a_watch_reads_what_the_judge_of_the_proof_reads(seed: int, tmp_path: Pa
             for level in ran:
                 stood[level.name] = level.value("n"), level.value("o")
                 if not level.fault:
-                    took[level.name] = running._inputs(level.name)
+                    took[level.name] = running.inputs_of(level.name)
             after = _seen(stood, took, held)
             expected += [(tick + 1, name) for name, watch in judge.items() if not watch.keeps(before, after)]
             seen += [
