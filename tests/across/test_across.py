@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,11 @@ from rcsc.compose.counterexample.explain import TraceSettings
 from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question, Surroundings
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, SHORT, Across, Question, Surroundings
 from rcsc.compose.together.repeated import repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands import run
+from rcsc.lang.interpret import Fault
 from rcsc.run.description import Description, description
 from rcsc.run.episodes.episode import BufferFault
 from rcsc.run.episodes.harm import HarmedMemory
@@ -150,6 +152,36 @@ def test_what_a_run_breaks_is_shown_by_the_shortest_one_and_the_executors_repeat
             "replay", shown.log, "--system", path, "--generated", made, "--executor", executor
         )
         assert status == 0, out
+
+
+_COUNTING = """\
+input go : bool
+input heat : int 0 .. 99
+output runs : bool safe false
+state ran : int 0 .. 12
+table move_left {
+  | line | go    | ran  || runs  | ran     |
+  |------|-------|------||-------|---------|
+  | on   | true  | < 12 || true  | ran + 1 |
+  | last | true  | 12   || true  |         |
+  | hot  | false |      || false | 0       |
+}
+level left { period 10 [ms] table move_left }
+"""
+
+
+def test_a_long_run_has_no_restart_no_refusal_and_no_change_of_an_input_that_it_breaks_without(
+    tmp_path: Path,
+) -> None:
+    path = _written(tmp_path, "requirement short : always left.ran < 10\n", files={"left.rcs": _COUNTING})
+    path.write_text(path.read_text() + '"panel.heat" = "left.heat"\n')
+    found = _answers(path)["short"]
+    steps = [step for tick in found.run for step in tick.values()]
+    assert len(found.run) > SHORT
+    assert not any(step.anew or step.fault is Fault.ADMIT for step in steps)
+    assert {tick["left"].taken["heat"] for tick in found.run} == {0}
+    wishes = [tick["boss"].taken["wish"] for tick in found.run]
+    assert sum(one != other for one, other in pairwise(wishes)) <= 1
 
 
 def test_a_wire_that_is_crossed_is_found(tmp_path: Path) -> None:

@@ -228,7 +228,9 @@ class Question:
             left += [(around, timing) for timing in self._timings if timing not in broken]
             for part in self._parts():
                 if part[0] not in broken and self._proved_at_last(in_kindest, part, around, little):
-                    return self._as_proved(self._kindest(found), *part, around, "")
+                    late = any(found.run_late)
+                    kindest = self._kindest(found, self._timings[0]) if late else found
+                    return self._as_proved(kindest, *part, around, "")
         effort = dict.fromkeys((*left[: len(self._timings)], *left[-1:]))
         return found if soon else self._with_effort(found, tuple(effort))
 
@@ -253,7 +255,10 @@ class Question:
                         told, fair=(COMES_TO_AN_END, *dict.fromkeys(trust for trust, _ in parties))
                     )
         run, known = self._run(EVERY[0], LONG, Timing.SCHEDULED)
-        return replace(found, run=run.ticks, broken_in=EVERY[0] if run.ticks else None, looked=known)
+        if not run.ticks:
+            return replace(found, looked=known)
+        found = replace(found, run=run.ticks, broken_in=EVERY[0], looked=known)
+        return self._kindest(found, Timing.SCHEDULED)
 
     def _with_lasso(self, found: Across) -> tuple[Across, Waits]:
         """Look for a run on which it waits for ever; return for how long it waits."""
@@ -299,10 +304,12 @@ class Question:
             found = replace(found, looked=max(found.looked, known))
         return found, frozenset(broken)
 
-    def _kindest(self, found: Across) -> Across:
-        """Return it with a run as long as its own in the kindest surroundings that has one, of late buffers."""
-        for around in reversed(tuple(self._surroundings())) if any(found.run_late) else ():
-            run, _ = self._run(around, len(found.run), self._timings[0])
+    def _kindest(self, found: Across, timing: Timing) -> Across:
+        """Return it with a run as long as its own in the kindest surroundings that has one: nothing befalls a level that need not."""
+        for around in reversed(tuple(self._surroundings())):
+            if around == found.broken_in:
+                break
+            run, _ = self._run(around, len(found.run), timing)
             if run.ticks:
                 return replace(found, run=run.ticks, run_late=run.late, broken_in=around)
         return found
@@ -317,6 +324,7 @@ class Question:
                 run, known = self._run(around, LONG, timing)
                 if run.ticks:
                     found = replace(found, run=run.ticks, run_late=run.late, broken_in=around)
+                    found = self._kindest(found, timing)
                 if (around, timing) == (EVERY[0], self._timings[0]):
                     found = replace(found, looked=max(found.looked, known))
         return found
