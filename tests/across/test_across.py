@@ -369,6 +369,7 @@ def test_an_open_one_says_how_long_no_run_is_that_breaks_it(tmp_path: Path, rcsc
     looked = int(line.partition("no run of ")[2].split()[0])
     assert 8 <= looked <= 60
     assert f"no run of {looked} ticks breaks it" in err
+    assert "it speaks of `left` alone: stated in the tables of `left`," in err
 
 
 def test_what_nothing_ever_asks_for_is_told(tmp_path: Path, rcsc: Rcsc) -> None:

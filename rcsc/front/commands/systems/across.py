@@ -17,6 +17,7 @@ from rcsc.compose.coverage.covered import Coverage
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
 from rcsc.compose.together.needed import core_across
+from rcsc.compose.together.product import read_by_all
 from rcsc.compose.together.proof import Across, Question
 from rcsc.compose.together.repeated import Answers, again, finding_of, repeated
 from rcsc.compose.together.said import said, state
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from rcsc.views.pages.requirement_page import RequirementStory
 
 _WHY = "a requirement, or an invariant of a level, that says why it holds may show it"
+_ALONE = "it speaks of `{0}` alone: stated in the tables of `{0}`, it is proved or refuted of that level, where more is tried"
 _NOT_REPEATED = "A run was found, and is of no executors: `rcsc prove` prints it."
 _FREER = "let the assumptions restrict less: whatever the levels do must leave values that keep them"
 
@@ -80,6 +82,8 @@ def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
                 attach("note", f"it says: {found.stated.text}")
                 attach("note", f"no run of {counted(found.looked, 'tick')} breaks it; a longer one may")
                 attach("help", _FREER if found.stuck else _WHY)
+                if (level := _alone(systems, found.stated)) and not found.stuck:
+                    attach("help", _ALONE.format(level))
             continue
         if found.proved:
             say_error(
@@ -93,6 +97,12 @@ def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
         for line in _befalls(found):
             attach("note", line)
         say_run(systems, explanation)
+
+
+def _alone(systems: Mapping[str, TransitionSystem], stated: Property) -> str:
+    """Return the level that a requirement reads, where it reads no other and nothing of what stands outside; else nothing."""
+    parties = {name.partition(".")[0] for name in read_by_all(stated)}
+    return next(iter(parties)) if len(parties) == 1 and parties <= systems.keys() else ""
 
 
 def _befalls(found: Across) -> Iterator[str]:
