@@ -1,6 +1,7 @@
 """What `rcsc prove` does: proves the levels of a system together, and says what it found."""
 
 import json
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -137,7 +138,9 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
             systems, alone, proof = whole.systems, whole.alone, whole.proof
     if asked.certificate is not None:
         _write(asked.certificate, systems, alone)
+    begun = time.perf_counter()
     given = None if asked.only or asked.variants else _across(systems, proof, settings, cache, asked)
+    proof = replace(proof, seconds=proof.seconds + time.perf_counter() - begun)
     if given is not None:
         sources |= given.loaded.sources
         loaded = {**loaded, ACROSS: given.loaded}
