@@ -17,7 +17,7 @@ from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program
 from rcsc.run.description import Description, description
 from tests.across.drawn import drawn, written
-from tests.across.truth import AnyTime, Befalls, Cycles, Runs, TooManyError, Truth, truth
+from tests.across.truth import AnyTime, Befalls, Cycles, Runs, TooManyError, Truth, followed, truth
 
 KINDEST = Befalls(refuses=False, restarts=False)
 
@@ -96,6 +96,8 @@ class Held:
         told = [f"proved {found.timing.value}"] if found.proved else []
         if found.proved:
             self._proved()
+        if found.run:
+            self._shown()
         if found.lasso:
             assert true.waits is None or true.least > SHORT, f"waits for ever: {true}"
             told.append("waits for ever")
@@ -110,6 +112,16 @@ class Held:
             assert not self.truth(KINDEST).asks, "something asks for it"
             told.append("vacuous")
         return told
+
+    def _shown(self) -> None:
+        """Hold the run that is shown against those that there are: each tick may leave what it leaves."""
+        found = self.found
+        assert found.broken_in is not None
+        runs = self.runs(of(found.broken_in, self.hardest.late if any(found.run_late) else 0))
+        assert found.proved or list(found.levels) == runs.names, f"a run of {found.levels}, not {runs.names}"
+        here = followed(runs, ({name: step.after for name, step in tick.items()} for tick in found.run))
+        assert here, "the run that is shown is none"
+        assert found.lasso or any(here.values()), "the run that is shown breaks nothing"
 
     def _shortest(self, ticks: int, true: Truth) -> None:
         broken_in = self.found.broken_in

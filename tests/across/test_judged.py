@@ -20,9 +20,9 @@ from tests.across.__main__ import main
 from tests.across.drawn import drawn, written
 from tests.across.held import System, judged
 from tests.across.systems import LateMemory
-from tests.across.truth import Befalls, Now, Runs
+from tests.across.truth import Befalls, Runs, followed
 
-QUICK = (1, 4, 5, 14, 35, 53)
+QUICK = (1, 4, 5, 14, 35, 53, 114, 250, 724, 900, 916)
 """Systems that are quickly answered: with what comes, orders, longer periods, refusals, late buffers."""
 MOST, TICKS = 400, 20
 
@@ -76,7 +76,7 @@ def test_the_runs_of_the_judge_are_those_of_the_executors(seed: int, tmp_path: P
     assert isinstance(memory, LateMemory)
     sources = {wire.source for wire in it.description.wires}
     outside = {source for source in sources if source.partition(".")[0] not in it.systems}
-    ages, here = dict.fromkeys(sources, 0), {runs.begun()}
+    ages, left = dict.fromkeys(sources, 0), list[dict[str, dict[str, Value]]]()
     for tick in range(TICKS):
         for source in sorted(outside):
             memory.publish(source, tuple(_any(random, kind) for kind in _kinds(it, source)))
@@ -90,14 +90,16 @@ def test_the_runs_of_the_judge_are_those_of_the_executors(seed: int, tmp_path: P
             running.step()
         running.tick = tick + 1
         memory.holds(sources - outside)
-        left = {name: level.values for name, level in zip(runs.names, running.levels, strict=True)}
-        if tick == 0:
-            stood = dict(left)
-        stood |= {name: left[name] for name, ran in zip(runs.names, due, strict=True) if ran}
-        here = {
-            after for at in here for after, _ in runs.onward(at) if _same(runs, runs.states[after], stood)
-        }
-        assert here, (tick, stood)
+        left.append(
+            {
+                level.name: dict(zip((leaf.name for leaf in level.sign.leaves), level.values, strict=False))
+                for level, ran in zip(running.levels, due, strict=True)
+                if ran
+            }
+        )
+    assert followed(runs, left)
+    left[-1] = {name: dict.fromkeys(of, -1) for name, of in left[0].items()}
+    assert not followed(runs, left)
 
 
 def _running(it: System) -> Running:
@@ -125,16 +127,6 @@ def _any(random: Random, kind: Scalar) -> Value:
     return value
 
 
-def _same(runs: Runs, now: Now, stood: dict[str, tuple[Value, ...]]) -> bool:
-    """Return whether a state is the one that executors left, but for numbers of orders, and outputs that nobody looks at."""
-    for name, member, stand in zip(runs.names, runs.members, now.levels, strict=True):
-        leaves = dict(zip((str(v.name) for v in member.ts.program.variables), stood[name], strict=False))
-        for at, leaf in enumerate(member.own):
-            if at not in member.numbers and at not in member.forgotten and stand.own[at] != leaves[leaf]:
-                return False
-    return True
-
-
 def never(*_: object) -> values.Node:
     return values.FALSE
 
@@ -149,8 +141,11 @@ def test_faults_are_noticed(place: str, seed: int) -> None:
 
 
 def test_a_slip_is_told_or_changes_nothing(tmp_path: Path) -> None:
-    became = {one.partition(": ")[2] for one in slips.judged(12, tmp_path)}
-    assert became == {slips.TOLD, slips.EQUIVALENT}
+    few = list(slips.slips(drawn(12)))[:2]
+    with patch.object(slips, "slips", lambda _: few):
+        became = {one.partition(": ")[2] for one in slips.judged(12, tmp_path)}
+    assert slips.TOLD in became
+    assert became <= {slips.TOLD, slips.EQUIVALENT}
 
 
 def test_each_kind_of_slip_is_made() -> None:

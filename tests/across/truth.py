@@ -8,7 +8,7 @@ Numbers of orders are only compared, copied and counted on: of two states that d
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from math import lcm
@@ -352,6 +352,15 @@ class Runs:
             return now.given[place]
         return (now.levels[at].taken if what == "taken" else now.levels[at].own)[place]
 
+    def leaves(self, state: int, left: Mapping[str, Mapping[str, Value]]) -> bool:
+        """Return whether a state is the one in which levels left this; of numbers of orders, and of what nobody reads, nothing is asked."""
+        return all(
+            stand.own[at] == left[name][leaf]
+            for name, member, stand in zip(self.names, self.members, self.states[state].levels, strict=True)
+            for at, leaf in enumerate(member.own)
+            if at not in member.numbers and at not in member.forgotten
+        )
+
     def onward(self, state: int) -> tuple[tuple[int, bool], ...]:
         """Return each state after the next tick, and whether nothing befell the levels in it."""
         if state not in self.known:
@@ -620,6 +629,28 @@ def truth(runs: Runs) -> Truth:
                 raise TooManyError
         wave = [] if least else following
     return Truth(least, asks, _longest(calmly) if calmly else 0, len(places))
+
+
+def followed(
+    runs: Runs, left: Iterable[Mapping[str, Mapping[str, Value]]]
+) -> dict[tuple[int, tuple[Values, ...]], bool]:
+    """Return how a system may stand after ticks that leave this of the levels that ran, and whether the last may break the requirement."""
+    monitors = [_Monitor(runs, one) for one in (runs.stated, *runs.environment)]
+    here = {(runs.begun(), tuple(tuple(one.first.values()) for one in monitors)): False}
+    stood = dict[str, Mapping[str, Value]]()
+    for tick in left:
+        stood |= tick
+        following = dict[tuple[int, tuple[Values, ...]], bool]()
+        for before, states in here:
+            for after, _ in runs.onward(before):
+                if not runs.leaves(after, stood):
+                    continue
+                steps = [one.step(of, before, after) for one, of in zip(monitors, states, strict=True)]
+                if all(step.kept for step in steps[1:]):
+                    key = after, tuple(step.states for step in steps)
+                    following[key] = following.get(key, False) or not steps[0].kept
+        here = following
+    return here
 
 
 # --- any timing -----------------------------------------------------------------------------
