@@ -17,6 +17,7 @@ which one never does refutes nothing.
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from rcsc.code.testing.figures import counted
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.exact.circuit import Circuit
 from rcsc.compose.exact.eventual import Waits, of_all_states, of_short_runs
@@ -72,8 +73,8 @@ def bounds(found: Waits) -> tuple[int, ...]:
 
 def waits_for(most: int, *, fair: bool) -> str:
     """Return for how long it waits, in words."""
-    what = "round of orders and answers" if fair else "calm tick"
-    return f"waits for at most {most} {what}{'' if most == 1 else 's'}" if most else "never waits"
+    what = counted(most, "round" if fair else "calm tick")
+    return f"waits for at most {what}{' of orders and answers' if fair else ''}" if most else "never waits"
 
 
 def fairness(systems: Mapping[str, TransitionSystem]) -> Iterator[tuple[str, Expr]]:

@@ -1,0 +1,239 @@
+"""What a verdict on a requirement across levels trusts and rests on, what is kept of it, and when it is asked anew: in milliseconds."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+import pytest
+
+from rcsc.base.host.cache import Cache
+from rcsc.compose.contract.claims import RUNS, Closed, Verdict
+from rcsc.compose.exact.eventual import Waits
+from rcsc.compose.together.eventually import bounds, waits_for
+from rcsc.compose.together.kept import answered, recalled
+from rcsc.compose.together.product import Timing
+from rcsc.compose.together.proof import EVERY, NEVER_LATE, NO_RESTART, Across, Question, Surroundings
+from rcsc.run.description import Wire
+from tests.across.drawn import Drawn, written
+from tests.across.held import System
+
+if TYPE_CHECKING:
+    from rcsc.compose.counterexample.cycle_run import CycleRun
+
+_LEVEL = """\
+input x : bool
+input y : int 0 .. 2
+output o : bool safe false
+table of_NAME {
+  | line | x     || o     |
+  |------|-------||-------|
+  | on   | true  || false |
+  | off  | false || true  |
+}
+level NAME { period 10 [ms] table of_NAME }
+"""
+_TEXTS = {
+    "rcsc.toml": 'name = "drawn"\n',
+    "requirements.rcs": "assume calm assumed : never plant.y = 2\nproperty p : a.o or b.o or plant.y < 2\n"
+    "property q : a.o\n",
+    **{f"{name}.rcs": _LEVEL.replace("NAME", name) for name in "ab"},
+}
+_WIRES = {"a.o": ["b.x"], "b.o": ["a.x"], "plant.y": ["a.y", "b.y"]}
+_MADE = Drawn({"a": "a", "b": "b"}, _WIRES, 1, _TEXTS)
+
+
+@pytest.fixture
+def question(tmp_path: Path) -> Question:
+    it = System.of(written(_MADE, tmp_path))
+    return Question(it.systems, it.description, it.program, it.program.properties[0])
+
+
+def _proved(question: Question, **rest: object) -> Across:
+    found = Across(question.stated, proved=True, levels=("a", "b"), late=1, timing=Timing.LATE)
+    return replace(found, **rest)  # type: ignore[arg-type]  # of each its own
+
+
+def test_a_verdict_trusts_what_is_kinder_than_what_may_befall_the_levels(question: Question) -> None:
+    def trusts(**rest: object) -> tuple[str, ...]:
+        return _proved(question, **rest).trusts(question.systems)
+
+    assert trusts() == ()
+    assert trusts(assumed=("calm",)) == ("assumption `calm` across levels, as it is declared",)
+    assert trusts(around=Surroundings(restarts=False)) == (NO_RESTART,)
+    assert trusts(timing=Timing.SCHEDULED) == (NEVER_LATE,)
+    assert trusts(fair=("it comes",)) == ("it comes",)
+    refused = trusts(around=Surroundings(refuses=False))
+    assert len(refused) == 2
+    assert all("never refused" in said for said in refused)
+
+
+def test_it_is_kinder_where_less_befalls_the_levels_than_may(question: Question) -> None:
+    assert not _proved(question).kinder
+    assert not _proved(question, late=0, timing=Timing.SCHEDULED).kinder
+    assert all(_proved(question, around=around).kinder for around in EVERY[1:])
+    assert _proved(question, timing=Timing.SCHEDULED).kinder
+    assert not _proved(question, proved=False, timing=Timing.SCHEDULED).kinder
+
+
+def test_it_rests_on_what_each_level_does_and_lacks_what_is_not_accepted(question: Question) -> None:
+    found = _proved(question, fair=("it comes",))
+    assert found.closed(question.systems, {}).lacks == (("a", RUNS), ("b", RUNS))
+    claims = {
+        ("a", RUNS): Closed(Verdict.PROVED, trusts=("something",)),
+        ("b", RUNS): Closed(Verdict.PROVED, lacks=(("c", RUNS),)),
+    }
+    closed = found.closed(question.systems, claims)
+    assert closed == Closed(Verdict.PROVED, (("c", RUNS),), ("it comes", "something"))
+    assert replace(found, proved=False).closed(question.systems, claims).verdict is Verdict.NOT_PROVED
+
+
+def test_a_run_breaks_it_in_its_last_tick_and_refutes_it_where_it_is_not_proved(question: Question) -> None:
+    run: tuple[dict[str, CycleRun], ...] = ({}, {}, {})
+    assert _proved(question, run=run).broken_in_tick == 3
+    assert _proved(question, ticks=4).broken_in_tick == 4
+    assert not _proved(question, run=run).refuted
+    assert _proved(question, run=run, proved=False).refuted
+    assert not _proved(question, proved=False).refuted
+
+
+# --- what comes --------------------------------------------------------------------------------
+
+
+def test_bounds_are_tried_where_something_speaks_for_them() -> None:
+    assert bounds(Waits(3, complete=True)) == (3,)
+    assert bounds(Waits(3, cycles=9, complete=False)) == (3, 6, 12)
+    assert bounds(Waits(3, cycles=3, complete=False)) == ()
+
+
+@pytest.mark.parametrize(
+    ("most", "fair", "said"),
+    [
+        (0, False, "never waits"),
+        (1, False, "waits for at most 1 calm tick"),
+        (2, False, "waits for at most 2 calm ticks"),
+        (1, True, "waits for at most 1 round of orders and answers"),
+        (4, True, "waits for at most 4 rounds of orders and answers"),
+    ],
+)
+def test_for_how_long_it_waits_is_said(most: int, fair: bool, said: str) -> None:
+    assert waits_for(most, fair=fair) == said
+
+
+# --- what is kept ------------------------------------------------------------------------------
+
+
+class _Answering:
+    """A question that counts how often it is asked."""
+
+    asked = 0
+
+    def __init__(self, question: Question, found: Across) -> None:
+        self.question, self.found = question, found
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.question, name)
+
+    def answer(self) -> Across:
+        self.asked += 1
+        return self.found
+
+
+def _full(question: Question, **rest: object) -> Across:
+    """Return an answer of which nothing is as it is by default."""
+    return _proved(
+        question, levels=("b",), by="somehow", around=EVERY[3], run_late=({"b.x": 1},), looked=5, vacuous=True,
+        assumed=("calm",), lasso=2, fair=("it comes",), stuck=True, ticks=7, **rest,
+    )  # fmt: skip
+
+
+def test_a_proof_is_kept_with_all_that_is_said_of_it(question: Question, tmp_path: Path) -> None:
+    cache = Cache(tmp_path / "kept", b"secret", "tool")
+    asked = _Answering(question, _full(question))
+    assert recalled(question, cache) is None
+    assert answered(cast(Question, asked), cache) == asked.found
+    kept = answered(cast(Question, asked), cache)
+    assert asked.asked == 1
+    assert kept == replace(asked.found, ticks=0)  # no run is kept, but its length
+
+
+def test_what_is_not_proved_is_asked_again_and_its_verdict_is_known(
+    question: Question, tmp_path: Path
+) -> None:
+    cache = Cache(tmp_path / "kept", b"secret", "tool")
+    asked = _Answering(question, _full(question, proved=False, run=({}, {})))
+    for times in (1, 2):
+        answered(cast(Question, asked), cache)
+        assert asked.asked == times
+    known = recalled(question, cache)
+    assert known is not None
+    assert (known.proved, known.refuted, known.broken_in_tick, known.run) == (False, True, 2, ())
+    assert answered(cast(Question, asked), None) == asked.found
+
+
+def _with_program(old: str, new: str, folder: Path) -> Question:
+    """Return the question of a system with another text."""
+    folder.mkdir()
+    texts = {name: text.replace(old, new) for name, text in _TEXTS.items()}
+    it = System.of(written(replace(_MADE, texts=texts), folder))
+    return Question(it.systems, it.description, it.program, it.program.properties[0])
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        lambda question, _: replace(question, stated=question.program.properties[1]),
+        lambda question, _: replace(question, system=replace(question.system, late_ticks=2)),
+        lambda question, _: replace(question, system=replace(question.system, tick_ms=5)),
+        lambda question, _: replace(question, program=replace(question.program, environment=())),
+        lambda question, _: replace(
+            question,
+            system=replace(
+                question.system,
+                wires=tuple(
+                    Wire(w.source.replace("a.o", "plant.o"), w.target) for w in question.system.wires
+                ),
+            ),
+        ),
+        lambda _, folder: _with_program("safe false", "safe true", folder / "b"),
+        lambda _, folder: _with_program("period 10", "period 20", folder / "b"),
+    ],
+    ids=["requirement", "late", "tick", "assumption", "wire", "level", "period"],
+)
+def test_what_a_verdict_depends_on_has_it_asked_anew(
+    other: Callable[[Question, Path], Question], question: Question, tmp_path: Path
+) -> None:
+    cache = Cache(tmp_path / "kept", b"secret", "tool")
+    answered(cast(Question, _Answering(question, _full(question))), cache)
+    assert recalled(question, cache) is not None
+    assert recalled(other(question, tmp_path), cache) is None
+
+
+def test_words_beside_a_requirement_do_not(question: Question, tmp_path: Path) -> None:
+    cache = Cache(tmp_path / "kept", b"secret", "tool")
+    answered(cast(Question, _Answering(question, _full(question))), cache)
+    assert recalled(replace(question, stated=replace(question.stated, doc="Other words.")), cache) is not None
+
+
+# --- which levels ------------------------------------------------------------------------------
+
+
+def test_a_question_is_about_the_levels_that_it_names_and_those_that_write_to_them(
+    question: Question,
+) -> None:
+    alone = replace(question, stated=question.program.properties[1])
+    assert alone._named() == ("a",)
+    assert alone.every == ("a", "b")
+    assert [*alone._parts()] == [
+        (Timing.ANY, ("a",)), (Timing.LATE, ("a",)), (Timing.LATE, ("a", "b")), (Timing.SCHEDULED, ("a",)),
+        (Timing.SCHEDULED, ("a", "b")),
+    ]  # fmt: skip
+    assert question._named() == ("a", "b")
+    wires = tuple(wire for wire in question.system.wires if wire.target != "a.x")
+    cut = replace(alone, system=replace(question.system, wires=wires))
+    assert cut.every == ("a",)
+    assert [*cut._surroundings()] == [*EVERY]
+    systems = {name: SimpleNamespace(refusing=lambda: SimpleNamespace(refuses=False)) for name in "ab"}
+    admits = replace(cut, systems=systems)  # type: ignore[arg-type]  # all that is asked of them
+    assert [*admits._surroundings()] == [EVERY[0], EVERY[2]]
