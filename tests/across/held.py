@@ -5,7 +5,7 @@ counted as open, and is no difference; nor is a system with more runs than are l
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc.compose.contract.transition import TransitionSystem
@@ -17,7 +17,17 @@ from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program
 from rcsc.run.description import Description, description
 from tests.across.drawn import drawn, written
-from tests.across.truth import AnyTime, Befalls, Cycles, Runs, TooManyError, Truth, followed, truth
+from tests.across.truth import (
+    MOST_TICKS,
+    AnyTime,
+    Befalls,
+    Cycles,
+    Runs,
+    TooManyError,
+    Truth,
+    followed,
+    truth,
+)
 
 KINDEST = Befalls(refuses=False, restarts=False)
 
@@ -68,16 +78,17 @@ def judged(seed: int, folder: Path, *, proofs: int = 1) -> list[str]:
 
 @dataclass(slots=True)
 class Held:
-    """An answer that is held against all runs."""
+    """An answer that is held against all runs, if they take no more than so many ticks."""
 
     it: System
     found: Across
+    most: int = MOST_TICKS
     known: dict[Befalls, Truth] = field(default_factory=dict)
 
     def truth(self, befalls: Befalls) -> Truth:
         """Return what is true where this may befall the levels."""
         if befalls not in self.known:
-            self.known[befalls] = truth(self.runs(befalls))
+            self.known[befalls] = truth(self.runs(befalls), self.most)
         return self.known[befalls]
 
     def runs(self, befalls: Befalls, made: Callable[..., Runs] = Runs, names: tuple[str, ...] = ()) -> Runs:
@@ -129,6 +140,9 @@ class Held:
         assert true.least == ticks, f"broken in tick {ticks}: {true}"
         least = self.truth(of(broken_in, self.hardest.late)).least
         assert least == ticks, f"broken in tick {ticks} in {broken_in}: {least}"
+        if self.found.kinder_timing and any(self.found.run_late) and broken_in.restarts:
+            calmer = self.truth(of(replace(broken_in, restarts=False), self.hardest.late)).least
+            assert calmer != ticks, f"a run as long needs no restart, as {broken_in} has"
 
     def _proved(self) -> None:
         found = self.found
@@ -141,7 +155,7 @@ class Held:
             assert not bounds, f"{found.by}: {true.waits}"
         links = [self.it.systems[name].links for name in found.levels]
         if found.timing is Timing.ANY and not any(one.above or one.below for one in links):
-            least = truth(self.runs(of(found.around, 0), AnyTime, found.levels)).least
+            least = truth(self.runs(of(found.around, 0), AnyTime, found.levels), self.most).least
             assert not least, f"proved under any timing in {found.around}: {least}"
 
 

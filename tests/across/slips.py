@@ -18,6 +18,8 @@ from tests.across.drawn import Drawn, drawn, written
 from tests.across.held import Held, System, of
 from tests.across.truth import TooManyError
 
+MOST = 200_000
+"""Ticks that are looked at of a mutant."""
 TOLD, EQUIVALENT, MISSED, TOO_MANY = "told", "equivalent", "missed", "too many runs"
 
 
@@ -93,7 +95,9 @@ def judged(seed: int, folder: Path) -> list[str]:
             it, found = _answers(mutant, folder / str(number))
         except (BadDescription, NoProgramError):
             continue  # types tell it
-        became = {_became(before, Held(it, found[name])) for name, before in proved.items() if name in found}
+        became = {
+            _became(before, Held(it, found[name], MOST)) for name, before in proved.items() if name in found
+        }
         told.append(f"{what}: {next(one for one in (MISSED, TOLD, TOO_MANY, EQUIVALENT) if one in became)}")
     return told
 

@@ -11,12 +11,12 @@ import pytest
 from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import RUNS, Closed, Verdict
 from rcsc.compose.exact.eventual import Waits
-from rcsc.compose.together.eventually import bounds, waits_for
+from rcsc.compose.together.eventually import ANSWERS, COMES_TO_AN_END, bounds, waits_for
 from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import EVERY, NEVER_LATE, NO_RESTART, Across, Question, Surroundings
 from rcsc.run.description import Wire
-from tests.across.drawn import Drawn, written
+from tests.across.drawn import Drawn, drawn, written
 from tests.across.held import System
 
 if TYPE_CHECKING:
@@ -33,6 +33,25 @@ table of_NAME {
   | off  | false || true  |
 }
 level NAME { period 10 [ms] table of_NAME }
+"""
+_BOSS = """\
+use words
+commands hand : motions
+enum stage { home, out }
+input wish : bool
+state at : stage restart home
+output busy : bool safe false
+table lead {
+  | line | at   | wish  | hand.resting | hand.status || at   | hand  | busy  |
+  |------|------|-------|--------------|-------------||------|-------|-------|
+  | go   | home | true  | true         |             || out  | go    | true  |
+  | wait | home | true  | false        |             || home | pause | false |
+  | calm | home | false |              |             || home | pause | false |
+  | busy | out  |       |              | executing   || out  |       | true  |
+  | back | out  |       |              | done        || home | pause | false |
+  | fail | out  |       |              | failed      || home | pause | false |
+}
+level boss { period 10 [ms] table lead }
 """
 _TEXTS = {
     "rcsc.toml": 'name = "drawn"\n',
@@ -214,6 +233,41 @@ def test_words_beside_a_requirement_do_not(question: Question, tmp_path: Path) -
     cache = Cache(tmp_path / "kept", b"secret", "tool")
     answered(cast(Question, _Answering(question, _full(question))), cache)
     assert recalled(replace(question, stated=replace(question.stated, doc="Other words.")), cache) is not None
+
+
+# --- what is assumed, and who is to answer -----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("assumed", "proved"),
+    [(("2",), True), ((), False), (("0", "1", "2"), False)],
+    ids=["it can be kept", "nothing", "nothing keeps it"],
+)
+def test_what_is_assumed_proves_something_where_it_can_be_kept(
+    assumed: tuple[str, ...], proved: bool, tmp_path: Path
+) -> None:
+    never = "".join(f"assume no_{value} assumed : never plant.y = {value}\n" for value in assumed)
+    texts = {**_TEXTS, "requirements.rcs": never + "property p : a.y < 2\n"}
+    it = System.of(written(replace(_MADE, late=0, texts=texts), tmp_path))
+    found = Question(it.systems, it.description, it.program, it.program.properties[0]).verdict(soon=True)
+    assert (found.proved, found.stuck) == (proved, len(assumed) == 3)
+    assert found.assumed == tuple(f"no_{value}" for value in assumed)
+
+
+def test_what_waits_for_a_party_outside_is_counted_in_rounds_and_trusts_that_it_answers(
+    tmp_path: Path,
+) -> None:
+    texts = {
+        **_TEXTS,
+        "words.rcs": drawn(0).texts["words.rcs"],
+        "boss.rcs": _BOSS,
+        "requirements.rcs": "requirement ends : when boss.busy, eventually not boss.busy\n",
+    }
+    it = System.of(written(Drawn({"boss": "boss"}, {"plant.wish": ["boss.wish"]}, 0, texts), tmp_path))
+    found = Question(it.systems, it.description, it.program, it.program.properties[0]).verdict()
+    assert found.proved
+    assert found.fair == (COMES_TO_AN_END, ANSWERS.format("hand"))
+    assert found.by == "waits for at most 1 round of orders and answers"
 
 
 # --- which levels ------------------------------------------------------------------------------

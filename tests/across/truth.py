@@ -39,7 +39,7 @@ from tests.judge.truth import _longest
 
 Values: TypeAlias = tuple[Value, ...]
 MOST_TICKS = 12_000
-"""Ticks from different states that are looked at for one requirement."""
+"""Ticks from different states that are looked at for one requirement, if no other number is said."""
 
 
 class TooManyError(Exception):
@@ -598,7 +598,7 @@ class _Monitor:
         return _Watched(tuple(now[name] for name in self.first), kept, waits, asks)
 
 
-def truth(runs: Runs) -> Truth:
+def truth(runs: Runs, most: int = MOST_TICKS) -> Truth:
     """Look at every run.
 
     Raises:
@@ -625,7 +625,7 @@ def truth(runs: Runs) -> Truth:
                 if calm and steps[0].waits:
                     calmly.append((places[at], places[key]))
             ran += len(runs.onward(before))
-            if ran > MOST_TICKS:
+            if ran > most:
                 raise TooManyError
         wave = [] if least else following
     return Truth(least, asks, _longest(calmly) if calmly else 0, len(places))
