@@ -2,19 +2,25 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
+from unittest.mock import patch
 
 import pytest
 
 from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import RUNS, Closed, Verdict
 from rcsc.compose.exact.eventual import Waits
+from rcsc.compose.proof.level import NotConfirmedError
 from rcsc.compose.together.eventually import ANSWERS, COMES_TO_AN_END, bounds, waits_for
 from rcsc.compose.together.kept import answered, recalled
-from rcsc.compose.together.product import Timing
+from rcsc.compose.together.product import LATE, Timing
 from rcsc.compose.together.proof import EVERY, NEVER_LATE, NO_RESTART, Across, Question, Surroundings
+from rcsc.lang.model import Int
+from rcsc.proof.solvers.sat import GaveUpError
+from rcsc.proof.symbolic import values
 from rcsc.run.description import Wire
 from tests.across.drawn import Drawn, drawn, written
 from tests.across.held import System
@@ -56,7 +62,7 @@ level boss { period 10 [ms] table lead }
 _TEXTS = {
     "rcsc.toml": 'name = "drawn"\n',
     "requirements.rcs": "assume calm assumed : never plant.y = 2\nproperty p : a.o or b.o or plant.y < 2\n"
-    "property q : a.o\n",
+    "property q : a.o\nproperty r : a.o /= a.x\n",
     **{f"{name}.rcs": _LEVEL.replace("NAME", name) for name in "ab"},
 }
 _WIRES = {"a.o": ["b.x"], "b.o": ["a.x"], "plant.y": ["a.y", "b.y"]}
@@ -268,6 +274,43 @@ def test_what_waits_for_a_party_outside_is_counted_in_rounds_and_trusts_that_it_
     assert found.proved
     assert found.fair == (COMES_TO_AN_END, ANSWERS.format("hand"))
     assert found.by == "waits for at most 1 round of orders and answers"
+
+
+# --- what is not confirmed ---------------------------------------------------------------------
+
+
+def _alone(question: Question) -> Question:
+    """Return a question about what a level keeps, where nothing is assumed."""
+    program = replace(question.program, environment=())
+    return replace(question, program=program, stated=program.properties[2])
+
+
+@pytest.mark.parametrize("error", [GaveUpError(), NotConfirmedError("it does not follow")])
+@pytest.mark.parametrize("of", ["property", "assumption"])
+def test_nothing_is_proved_that_z3_does_not_confirm(error: Exception, of: str, question: Question) -> None:
+    if of == "property":
+        question = _alone(question)
+    with patch("rcsc.compose.together.proof.confirm_owed", side_effect=error):
+        found = question.verdict(soon=True)
+    assert not found.proved
+    assert found.stuck is (of == "assumption")
+
+
+def test_a_search_that_is_given_up_proves_nothing(question: Question) -> None:
+    alone = _alone(question)
+    assert alone.verdict(soon=True).proved
+    with patch("rcsc.compose.together.proof.PDR.search", side_effect=GaveUpError):
+        assert not alone.verdict(soon=True).proved
+
+
+def test_no_reader_sees_what_is_older_than_it_has_seen(question: Question) -> None:
+    late = replace(question, system=replace(question.system, late_ticks=2))
+    ts = late.together(("a", "b"), Timing.LATE, EVERY[0])
+    kind = Int(0, 2)
+    for then, now in product(range(3), repeat=2):
+        before = {f"{LATE} b.x": values.constant(kind, then)}
+        allowed = ts._never_back(before, {"b.x": values.constant(kind, now)})
+        assert (allowed is values.TRUE) == (now <= then + 1)
 
 
 # --- which levels ------------------------------------------------------------------------------
