@@ -1,4 +1,5 @@
-"""Requirements across levels. The judge runs the levels' own executors under `rcsc.run`, in every state and with all that may come.
+"""Requirements across levels: what is said of them, held against all runs of small systems, and against the levels' executors.
 
-Many drawn systems, and slips in them: `python -m tests.across`.
+Modules beside the tests: `drawn` (tiny systems), `truth` (every run of one, cycle by cycle looked up), `held` (answers against that), `slips`
+(mutants of systems, likewise), `systems` (systems of one shape, and the executors of those), `__main__`: many, `python -m tests.across`.
 """

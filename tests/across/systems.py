@@ -1,7 +1,6 @@
-"""Systems of two and three small levels drawn at random, and the same systems as they run, for every state that they reach.
+"""Systems of two and three small levels drawn at random, all of one shape, and the same systems on Python executors.
 
-In: a seed. Out: files; of a requirement the shortest run that breaks it, or none. The judge steps `run.system.System` on Python executors,
-restarts levels as `run.adopt` does, publishes what stands outside, and steps monitors by themselves: it shares nothing with the product.
+In: a seed. Out: files; a system that steps. Systems of many shapes are drawn by `drawn`, and all of their runs are in `truth`.
 """
 
 from collections.abc import Iterator, Mapping
