@@ -383,6 +383,21 @@ def test_the_steps_of_a_table_are_read_line_by_line(tmp_path: Path, monkeypatch:
     assert counts["allowed"] > 0
 
 
+def moved(made: ranking._Ranking, *steps: tuple[int, int]) -> smt.Term:
+    """That a cycle moves the two numbers by one of these."""
+    return smt.any_of(
+        [
+            smt.all_of(
+                [
+                    smt.equal(each.after, smt.integer_operation("+", each.before, smt.literal(each.kind, by)), each.kind)
+                    for each, by in zip(made.numbers, step, strict=True)
+                ]
+            )
+            for step in steps
+        ]
+    )
+
+
 @pytest.fixture
 def lines_of_two_numbers() -> ranking._Ranking:
     """One line that follows itself, in a cycle that moves `a` and `b` by 1 and -2, or by -2 and 1: only their sum goes one way."""
@@ -390,16 +405,7 @@ def lines_of_two_numbers() -> ranking._Ranking:
     made.solver = Solver()
     terms = {name: smt.variable(name, kind) for name in ("a", "b", "a'", "b'")}
     made.numbers = [ranking.KeptNumber(name, kind, terms[name], terms[f"{name}'"]) for name in ("a", "b")]
-    moves = [
-        smt.all_of(
-            [
-                smt.equal(each.after, smt.integer_operation("+", each.before, smt.literal(kind, by)), kind)
-                for each, by in zip(made.numbers, step, strict=True)
-            ]
-        )
-        for step in ((1, -2), (-2, 1))
-    ]
-    made.solver.add(smt.any_of(moves))
+    made.solver.add(moved(made, (1, -2), (-2, 1)))
     made.moves, made.counted = [], []
     made.last = made.now = made.next = [smt.variable("runs", Bool())]
     made.always = {(0, 0)}
@@ -411,6 +417,33 @@ def test_a_sum_of_two_numbers_that_falls_stops_a_line(lines_of_two_numbers: rank
     found = lines_of_two_numbers._sum(0, [], [])
     assert found is not None
     assert found[0] == RisingLine("l", "a + b", falls=True)
+
+
+def test_a_sum_of_two_numbers_need_not_fall_in_cycles_that_are_not_looked_at(
+    lines_of_two_numbers: ranking._Ranking,
+) -> None:
+    made = lines_of_two_numbers
+    made.solver = Solver()
+    steps = (1, -2), (-2, 1)
+    made.solver.add(moved(made, *steps, (2, 2), (-3, -3)))
+    assert made._sum(0, [moved(made, *steps)], []) is None
+    found = made._sum(0, [moved(made, *steps)], [moved(made, *steps)])
+    assert found is not None
+    assert found[0] == RisingLine("l", "a + b", falls=True)
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_a_way_is_as_long_as_its_steps_are_at_least(
+    falls: bool, lines_of_two_numbers: ranking._Ranking
+) -> None:
+    """In parts of its whole width: half of it, half of that and so on, until each step is as long; here steps are of 1 or more."""
+    made = lines_of_two_numbers
+    low, high = (smt.as_number(smt.variable(name, Int(0, 100))) for name in ("low", "high"))
+    number = ranking.KeptNumber("x", Real(0.0, 100.0), *((high, low) if falls else (low, high)))
+    made.solver = Solver()
+    made.solver.add(smt.below(low, high, Int(0, 100)))
+    assert made._least_move([], number, falls=falls) == 100 / 2**7
+    assert made._least_move([], number, falls=not falls) is None
 
 
 @pytest.mark.parametrize("orders", [False, True])

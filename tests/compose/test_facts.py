@@ -11,6 +11,7 @@ from rcsc.compose.proof.assume_guarantee import promises
 from rcsc.compose.proof.level import Verdict, prove_level
 from rcsc.compose.proof.system import SystemProof, transition_systems
 from rcsc.front.commands import run
+from rcsc.lang.interpret import evaluate
 from tests.support.programs.systems import LITTLE, alone, small_level, small_system, small_text, solo_system
 from tests.support.programs.texts import edited
 from tests.support.proved import prove_system
@@ -410,6 +411,19 @@ def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Pat
     assert (claim.proved, claim.trusts) == (True, words)
     assert trusts(whole, Sort.PROPERTY, "", "bounded") == ()
     assert trusts(whole, Sort.SOME_LINE, "t") == ()
+
+
+@pytest.mark.parametrize(("claim", "kept"), [("r / 4.0 > 0.4", True), ("r / 4.0 > 0.5", False), ("r / 2.0 < 1.0", True)])
+def test_what_the_outside_can_keep_is_tried_with_doubles(claim: str, kept: bool) -> None:
+    """What it gives is what is promised of it, wherever the assumption stands."""
+    ts = alone(
+        f"input r : real 1.5 .. 2.0\nassume part assumed : {claim}\n"
+        "table t assuming part {\n| line | r ||\n| any | ||\n}\nlevel solo { period 40 [ms] table t }\n"
+    )
+    [assumption] = ts.program.assumptions
+    found = ts._kept_by(assumption, {"r"}, {}, ())
+    assert (found is not None) == kept
+    assert found is None or evaluate(assumption.condition, found) is True
 
 
 def test_lines_that_were_looked_at_with_refusals_are_not_looked_at_without() -> None:

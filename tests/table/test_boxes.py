@@ -555,7 +555,7 @@ def test_boxes_of_many_intervals_meet_in_few_steps() -> None:
 
 def test_what_lines_fill_together_is_counted_once_however_many_meet() -> None:
     """Of five lines of two axes drawn 300 times; the count is exact."""
-    draw, extent = Random(7), (0, 4)  # noqa: S311  # the same spans in every run
+    draw, extent = Random(7), (0, 4)  # noqa: S311 - the same lines in every run
     for _ in range(300):
         spans = [[sorted((draw.randint(0, 4), draw.randint(0, 4))) for _ in "xy"] for _ in range(5)]
         lines = [

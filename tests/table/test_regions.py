@@ -34,6 +34,7 @@ from rcsc.lang.model import (
     Read,
     Real,
     Scalar,
+    Single,
     Snapshot,
     Standing,
     Table,
@@ -738,6 +739,22 @@ def test_a_gap_whose_witnesses_no_assumption_allows_is_looked_for_anew(
     [found] = decision.narrowed_gap(Gap(({"x": 0, "y": 0}, {"x": 1, "y": 1}), (None, None)))
     assert isinstance(found, Gap)
     assert found.witnesses == (least_,)
+
+
+def test_inputs_that_an_assumption_allows_are_counted_one_by_one_where_it_is_not_linear() -> None:
+    """Of a region of keys; of the singles from 1.0 on there are four."""
+    decision = deciding(
+        "input x : int 0 .. 9\ninput r : single 1.0 .. 1.0000003576278687\nassume some assumed : x * x < 30 + x\n"
+        "table t assuming some {\n| line | x | r ||\n| a | < 5 | > 1.0 ||\n| d | DEFAULT | ||\n}\n"
+    )
+    least_ = decision.program.variables[1].type
+    assert isinstance(least_, Single)
+    low, high = key_bounds(least_)
+    assert high - low == 3
+    for x in range(10):
+        for r in range(low, high + 1):
+            region = {VariableName("x"): ((x, 9),), VariableName("r"): ((low, r),)}
+            assert decision.allowed_in(region) == max(0, 6 - x) * (r - low + 1)
 
 
 @pytest.mark.parametrize(
