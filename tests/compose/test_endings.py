@@ -389,7 +389,11 @@ def moved(made: ranking._Ranking, *steps: tuple[int, int]) -> smt.Term:
         [
             smt.all_of(
                 [
-                    smt.equal(each.after, smt.integer_operation("+", each.before, smt.literal(each.kind, by)), each.kind)
+                    smt.equal(
+                        each.after,
+                        smt.integer_operation("+", each.before, smt.literal(each.kind, by)),
+                        each.kind,
+                    )
                     for each, by in zip(made.numbers, step, strict=True)
                 ]
             )

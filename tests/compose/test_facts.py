@@ -413,7 +413,9 @@ def test_a_property_about_an_input_trusts_that_no_other_is_refused(tmp_path: Pat
     assert trusts(whole, Sort.SOME_LINE, "t") == ()
 
 
-@pytest.mark.parametrize(("claim", "kept"), [("r / 4.0 > 0.4", True), ("r / 4.0 > 0.5", False), ("r / 2.0 < 1.0", True)])
+@pytest.mark.parametrize(
+    ("claim", "kept"), [("r / 4.0 > 0.4", True), ("r / 4.0 > 0.5", False), ("r / 2.0 < 1.0", True)]
+)
 def test_what_the_outside_can_keep_is_tried_with_doubles(claim: str, kept: bool) -> None:
     """What it gives is what is promised of it, wherever the assumption stands."""
     ts = alone(

@@ -1,7 +1,7 @@
 """What is stated of levels and asked about them, exactly: goals, what is missing for a goal, predicates, claims in words, questions."""
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import pytest
@@ -23,10 +23,12 @@ from rcsc.compose.contract.claims import (
 from rcsc.compose.contract.claims import RESTING as RESTS
 from rcsc.compose.contract.environment import Above, _admits, links
 from rcsc.compose.contract.obligations import Sort, Unstated, command_stays, obligations, pairs, unstated
+from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
 from rcsc.compose.contract.watched import opened
 from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, FoundInvariant
 from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import system as system_proof
@@ -285,6 +287,36 @@ def test_a_kept_proof_is_of_one_level_and_of_one_effort(upper: TransitionSystem,
     keys = [system_proof._key(ts, effort) for ts in (upper, lower) for effort in efforts]
     assert len(set(keys)) == len(keys)
     assert system_proof._key(upper, replace(LITTLE)) == keys[0]
+
+
+def test_clauses_are_an_invariant_only_where_no_cycle_breaks_them() -> None:
+    """Every set of one clause or two over two truth values, asked of Z3 and gone through."""
+    ts = alone(
+        "input x : bool\nstate a : bool\nstate b : bool\nmodule step reads x, a, b writes a, b { b := a and x  a := not b }\n"
+        "table t {\n| line | x ||\n| any | ||\n}\nlevel solo { period 40 [ms] preprocess step table t }\n"
+    )
+    cycle, first = any_cycle(ts), ts.firsts()["first"]
+    predicates = tuple(Predicate(leaf, Bool()) for leaf in "ab")
+    asked = Confirmation(predicates, (first,), cycle, cycle.cases, Keyed(), Limits())
+    literals = [(at, value) for at in (0, 1) for value in (0, 1, ~0)]
+    cubes = [
+        *((one,) for one in literals),
+        *(pair for pair in combinations(literals, 2) if pair[0][0] != pair[1][0]),
+    ]
+
+    def inside(state: tuple[bool, bool], cube: Clause) -> bool:
+        return all((state[at] == value) if value >= 0 else (state[at] != ~value) for at, value in cube)
+
+    states = list(product((False, True), repeat=2))
+    after = {(a, b, x): (not (a and x), a and x) for (a, b), x in product(states, (False, True))}
+    for clauses in [*((one,) for one in cubes), *combinations(cubes, 2)]:
+        kept = [state for state in states if not any(inside(state, cube) for cube in clauses)]
+        ends = {after[*state, x] for state in kept for x in (False, True)}
+        breaks = any(inside(end, cube) for end in ends for cube in clauses)
+        said = {asked.step_question(clauses, case).check() for case in cycle.cases}
+        assert (Answer.SATISFIABLE in said) == breaks, clauses
+        begins = any(inside((True, False), cube) for cube in clauses)
+        assert (asked.first_question(clauses, first).check() is Answer.SATISFIABLE) == begins, clauses
 
 
 def test_a_level_is_proved_again_with_the_clauses_that_it_has() -> None:

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -120,6 +121,14 @@ def test_who_is_served_and_commanded_is_linked_word_for_word(dock: Path) -> None
     )  # fmt: skip
     links = systems["drive"].links
     assert (links.above, links.below, links.free) == (supervisor, (), ("travelled_mm", "bumper"))
+
+
+def test_what_no_superior_asks_for_is_no_goal_of_a_level_that_declares_whom_it_serves(dock: Path) -> None:
+    ts = transition_systems(dock)["supervisor"]
+    alone = unstated(replace(ts, links=replace(ts.links, above=None)))
+    assert {one.sort: one.applies for one in alone} == dict.fromkeys(
+        (Sort.WAITS, Sort.PAUSES, Sort.ENDS), False
+    )
 
 
 @pytest.mark.parametrize(("restart", "left"), [(" restart bad", []), ("", [Sort.FAILED_STAYS])])

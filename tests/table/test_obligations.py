@@ -135,6 +135,11 @@ WRONG = [
     ("q(a + 1)", "RCS413"),
     ("for i in 0 .. 3 { n := n + 3 }", "RCS413"),
     ("if a * a < 65 { n := a + 2 }", "RCS413"),
+    ("local k : int 0 .. 9 := a + 1", "RCS413"),
+    ("local k : int 0 .. 9 if yes { k := 0 } else { k := a + 1 }", "RCS413"),
+    ("local k : real 0.0 .. 9.0 k := x", "RCS413"),
+    ("xs[0] := a + 1", "RCS413"),
+    ("xs[a mod 4] := a + 1", "RCS413"),
 ]
 
 

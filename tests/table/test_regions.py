@@ -670,6 +670,16 @@ def test_two_lines_that_an_input_is_known_to_match_need_no_solver() -> None:
     assert not decision.by_solver
 
 
+def test_each_two_lines_that_match_an_input_which_the_solver_gave_are_told() -> None:
+    decision = deciding(HYPERBOLA.replace("< 7", "< 8").replace("\n}", "\n| c | x * y >= 6 ||\n}"))
+    found = [each.finding for each in decision.overlaps(Search(witnesses=[{"x": 7, "y": 1}]))]
+    assert [(each.first, each.second) for each in found if isinstance(each, Overlap)] == [
+        (0, 1),
+        (0, 2),
+        (1, 2),
+    ]
+
+
 def test_an_input_that_is_known_is_a_gap_in_a_region_that_was_given_up() -> None:
     decision = deciding(HYPERBOLA.replace(">= 7", "> 7"))
     decision._tried = (({"x": 7, "y": 1}, frozenset()),)
