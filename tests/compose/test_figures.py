@@ -129,6 +129,17 @@ def test_pairs_of_lines_that_may_meet_are_stated_and_no_others(tmp_path: Path) -
     assert solver.check() is Answer.UNSATISFIABLE
 
 
+def test_each_answer_that_a_status_can_give_stays(upper: TransitionSystem) -> None:
+    above = upper.links.above
+    assert above is not None
+    found = []
+    for done, failed in (("done", "failed"), ("none", "failed"), ("done", "none"), ("none", "none")):
+        ts = replace(upper, links=replace(upper.links, above=replace(above, done=done, failed=failed)))
+        sorts = [one.sort for one in obligations(ts, any_cycle(ts))]
+        found.append([sort in sorts for sort in (Sort.DONE_STAYS, Sort.FAILED_STAYS)])
+    assert found == [[True, True], [False, True], [True, False], [False, False]]
+
+
 def test_a_new_command_may_be_passed_over_where_a_stopping_assumption_fails(upper: TransitionSystem) -> None:
     tables = tuple(replace(table, stops=table.assumptions) for table in upper.program.tables)
     stopping = replace(upper, program=replace(upper.program, tables=tables))

@@ -356,3 +356,15 @@ def test_what_a_monitor_sees_of_a_refused_reading_is_true_or_false_and_another_t
         unknown = f"{REFUSED}{suffix}: (> level_mm int:50)"
         assert unknown in values.variables([made.after[mode]])
         assert unknown not in values.variables([other.after[mode]])
+
+
+def test_a_property_is_watched_cycle_by_cycle() -> None:
+    """It may look back at the cycle before; what is not defined is not kept."""
+    program = program_of(
+        "input n : int 0 .. 9\ninput m : int 0 .. 9\noutput o : bool\nproperty up : n mod m >= was n\n"
+        "table t {\n| line | n || o |\n| any | || true |\n}\nlevel solo { period 40 [ms] table t }\n"
+    )
+    watch = Watch(program.properties[0])
+    for before, n, m in product(range(3), range(3), range(3)):
+        kept = m > 0 and n % m >= before
+        assert watch.keeps({"n": before, "m": 0}, {"n": n, "m": m}) is kept

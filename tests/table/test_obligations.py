@@ -19,6 +19,7 @@ from rcsc.front.commands import run
 from rcsc.lang.expressions.intervals import may_be_undefined
 from rcsc.lang.model import NOWHERE, Apply, Int, OneTable, Op, Real, Scalar, Single
 from rcsc.lang.operator_table import Arithmetic
+from rcsc.proof.procedures import discharge
 from rcsc.proof.procedures.discharge import Asker, Discharge
 from rcsc.proof.procedures.obligations import Obligations
 from rcsc.proof.solvers import smt
@@ -849,6 +850,26 @@ def test_only_a_witness_that_is_wanted_is_looked_for(wanted: bool) -> None:
     with smt.until(lambda: True):
         [given_up] = asker.unshown([owed], list, lambda _: wanted)
     assert (given_up.outcome, given_up.witness) == (Discharge.OPEN, ())
+
+
+@pytest.mark.parametrize("most", [0, 1, 3, 9])
+def test_each_obligation_that_is_not_shown_is_told_once_however_many_are_given_up(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some that fail, and many of which the solver says nothing."""
+    a = values.variable("a", Int(0, 9))
+    fails, unknown = values.inside(a, 0, 4), values.inside(a, 0, 7)
+    goods = [fails, *[unknown] * 4, values.inside(a, 0, 3), unknown, unknown]
+    asked = discharge._Question._ask
+    monkeypatch.setattr(discharge, "MOST_UNKNOWN", most)
+    monkeypatch.setattr(
+        discharge._Question,
+        "_ask",
+        lambda question, bad: Answer.UNKNOWN if "7" in str(bad) else asked(question, bad),
+    )
+    owed = [Obligation(Code.INDEX, str(at), NOWHERE, values.TRUE, good) for at, good in enumerate(goods)]
+    told = Asker(Options(), {"a": 0}).unshown(owed, list, lambda _: False)
+    assert sorted(failure.obligation.message for failure in told) == [str(at) for at in range(len(goods))]
 
 
 @pytest.mark.parametrize("kind", [Int(0, 10), Real(0.0, 10.0)])
