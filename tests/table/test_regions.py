@@ -634,6 +634,36 @@ def test_a_search_that_is_to_go_without_the_solver_asks_it_nothing() -> None:
         assert not decision.by_solver
 
 
+@pytest.mark.parametrize(
+    ("other", "third", "wrong"),
+    [
+        (">= 7", "", []),
+        (">= 6", "", [Overlap]),
+        ("> 7", "", [Gap]),
+        (">= 7", "| c | x * y = 3 ||", [Overlap]),
+        ("in {7, 8}", "| c | x * y > 8 ||", []),
+        ("in {7, 8}", "| c | x * y > 7 ||", [Overlap]),
+        ("in {7, 9}", "| c | x * y > 9 ||", [Gap]),
+    ],
+)
+def test_of_products_two_lines_that_meet_and_inputs_that_none_matches_are_found(
+    other: str, third: str, wrong: list[type]
+) -> None:
+    decision = deciding(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n"
+        f"| a | x * y < 7 ||\n| b | x * y {other} ||\n{third}\n}}\n"
+    )
+    assert [type(each) for each in decision.decided().findings] == wrong
+    asked = decision.asked
+    for lines in itertools.combinations(range(len(decision.clauses)), 2):
+        meets = any(
+            isinstance(each, Overlap) and (each.first, each.second) == lines
+            for each in decision.decided().findings
+        )
+        fault = asked.holds(decision.fault(lines), smt.any_of([asked.line(at) for at in lines]))
+        assert (fault is smt.Answer.SATISFIABLE) == meets
+
+
 def test_a_table_of_products_has_a_certificate_of_its_own_that_rests_on_the_solver() -> None:
     program = compiled(HYPERBOLA)
     assert relational.certificate_alone(program, program.tables[0], BOXES) is not None
@@ -749,6 +779,17 @@ def test_a_gap_whose_witnesses_no_assumption_allows_is_looked_for_anew(
     [found] = decision.narrowed_gap(Gap(({"x": 0, "y": 0}, {"x": 1, "y": 1}), (None, None)))
     assert isinstance(found, Gap)
     assert found.witnesses == (least_,)
+
+
+def test_inputs_are_counted_where_all_regions_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    decision = deciding(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\nassume less assumed : x < y\n"
+        "table t assuming less {\n| line | x ||\n| a | < 5 ||\n| d | DEFAULT ||\n}\n"
+    )
+    assert decision.allowed_in({}) == 45
+    assert decision.allowed_in({VariableName("x"): ((3, 4),)}) == 11
+    monkeypatch.setattr(counting, "inputs", lambda *_: None)
+    assert decision.allowed_in({}) is None
 
 
 def test_inputs_that_an_assumption_allows_are_counted_one_by_one_where_it_is_not_linear() -> None:
