@@ -76,7 +76,8 @@ TESTS = tuple(
     compose/test_facts compose/test_protocol whole_systems/test_whole_systems
     over_time/test_templates over_time/test_past over_time/test_requirements over_time/test_assumed over_time/test_eventually
     over_time/test_published exact/test_circuit exact/test_exact exact/test_eventual
-    across/test_verdicts across/test_judged across/test_left_open across/test_conforms across/test_across across/test_eventually across/test_needed
+    across/test_verdicts across/test_judged across/test_left_open across/test_conforms across/test_across
+    across/test_eventually across/test_needed
     """.split()
 )
 Key = TypeVar("Key")
