@@ -2,7 +2,7 @@
 
 In: a seed. Out: what became of each mutant: *told*, a requirement that was proved of the system is refuted of the mutant by a run;
 *equivalent*, each that was proved holds of the mutant in the same surroundings, as all of its runs show; *missed*, a run breaks one, and
-none is found; *too many runs* to say.
+none is found; *too many runs* to say. Only of requirements is asked whose system itself has few enough.
 """
 
 from collections.abc import Iterator, Mapping
@@ -88,7 +88,8 @@ def judged(seed: int, folder: Path) -> list[str]:
     """
     made, told = drawn(seed), list[str]()
     (folder / "made").mkdir()
-    proved = {name: found for name, found in _answers(made, folder / "made")[1].items() if found.proved}
+    it, answers = _answers(made, folder / "made")
+    proved = {name: found for name, found in answers.items() if found.proved and _known(Held(it, found))}
     for number, (what, mutant) in enumerate(slips(made) if proved else ()):
         (folder / str(number)).mkdir()
         try:
@@ -106,6 +107,15 @@ def _answers(made: Drawn, folder: Path) -> tuple[System, dict[str, Across]]:
     it = System.of(written(made, folder))
     asked = {one.name: Question(it.systems, it.description, it.program, one) for one in it.program.properties}
     return it, {name: question.answer() for name, question in asked.items()}
+
+
+def _known(held: Held) -> bool:
+    """Return whether all runs of the system itself are looked at: of one that has too many nothing is asked of its mutants."""
+    try:
+        held.verdicts()
+    except TooManyError:
+        return False
+    return True
 
 
 def _became(before: Across, held: Held) -> str:
