@@ -19,7 +19,8 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from tests.across import held, slips, test_left_open, test_plain
+from tests.across import test_left_open, test_plain
+from tests.across.judge import held, slips
 
 ENOUGH = 0.98
 KINDS: dict[str, Callable[[int, Path], list[str]]] = {

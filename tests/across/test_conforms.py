@@ -24,7 +24,7 @@ from rcsc.proof.symbolic.values import Node
 from rcsc.run.description import Description, description
 from rcsc.run.levels import RunningLevel, StateTableError, running_level
 from rcsc.run.system import System, executors, signatures
-from tests.across.systems import LateMemory
+from tests.across.judge.systems import LateMemory
 
 _DATA = Path(__file__).parents[1] / "data" / "two_axes"
 

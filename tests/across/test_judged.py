@@ -15,12 +15,12 @@ from rcsc.proof.symbolic import values
 from rcsc.run.levels import StateTableError, running_level
 from rcsc.run.system import System as Running
 from rcsc.run.system import executors, signatures
-from tests.across import slips
 from tests.across.__main__ import main, shares
-from tests.across.drawn import drawn, written
-from tests.across.held import System, judged
-from tests.across.systems import LateMemory
-from tests.across.truth import Befalls, Runs, followed
+from tests.across.judge import slips
+from tests.across.judge.drawn import drawn, written
+from tests.across.judge.held import System, judged
+from tests.across.judge.systems import LateMemory
+from tests.across.judge.truth import Befalls, Runs, followed
 
 QUICK = (4, 5, 14, 53, 98, 114, 250, 724, 900, 916)
 """Systems that are quickly answered: with what comes, orders, longer periods, refusals, late buffers."""

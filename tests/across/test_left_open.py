@@ -19,9 +19,9 @@ from rcsc.run.episodes.episode import BufferFault, Episode
 from rcsc.run.episodes.loop import Loop
 from rcsc.run.episodes.proved.watch import ProvedHolds
 from rcsc.run.episodes.stand import stand
-from tests.across.held import System
-from tests.across.systems import Drawn, drawn, written
-from tests.across.truth import Befalls, Runs, TooManyError, truth
+from tests.across.judge.held import System
+from tests.across.judge.systems import Drawn, drawn, written
+from tests.across.judge.truth import Befalls, Runs, TooManyError, truth
 
 _UP = """\
 input go : bool

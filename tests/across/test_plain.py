@@ -16,7 +16,7 @@ from rcsc.front.commands import run
 from rcsc.run.description import description
 from rcsc.run.levels import running_level
 from rcsc.run.system import System, executors, signatures
-from tests.across.systems import LateMemory
+from tests.across.judge.systems import LateMemory
 
 _WORDS = "record pair { p : bool q : bool k : int 0 .. 9 = 2 }\n"
 _UP = """\

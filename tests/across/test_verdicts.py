@@ -22,8 +22,8 @@ from rcsc.lang.model import Int
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.run.description import Wire
-from tests.across.drawn import Drawn, drawn, written
-from tests.across.held import System
+from tests.across.judge.drawn import Drawn, drawn, written
+from tests.across.judge.held import System
 
 if TYPE_CHECKING:
     from rcsc.compose.counterexample.cycle_run import CycleRun

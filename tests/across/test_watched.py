@@ -29,8 +29,8 @@ from rcsc.run.log.read import read
 from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.required import ACROSS, broken_in
 from rcsc.run.signature import Values
-from tests.across.systems import Running, drawn
-from tests.across.systems import written as written_drawn
+from tests.across.judge.systems import Running, drawn
+from tests.across.judge.systems import written as written_drawn
 from tests.across.test_across import _BOSS, _COUNTS, Rcsc, _written
 from tests.across.test_across import rcsc as rcsc  # noqa: PLC0414  # the fixture
 

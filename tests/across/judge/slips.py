@@ -14,9 +14,9 @@ from rcsc.compose.proof.system import NoProgramError
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import Across, Question
 from rcsc.run.description import BadDescription
-from tests.across.drawn import Drawn, drawn, written
-from tests.across.held import Held, System, of
-from tests.across.truth import TooManyError
+from tests.across.judge.drawn import Drawn, drawn, written
+from tests.across.judge.held import Held, System, of
+from tests.across.judge.truth import TooManyError
 
 MOST = 200_000
 """Ticks that are looked at of a mutant."""

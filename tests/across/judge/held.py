@@ -16,8 +16,8 @@ from rcsc.compose.together.proof import SHORT, Across, Question, Surroundings
 from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program
 from rcsc.run.description import Description, description
-from tests.across.drawn import drawn, written
-from tests.across.truth import (
+from tests.across.judge.drawn import drawn, written
+from tests.across.judge.truth import (
     MOST_TICKS,
     AnyTime,
     Befalls,
