@@ -31,6 +31,7 @@ from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, FoundInvariant
 from rcsc.compose.proof import assume_guarantee, termination
+from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
 from rcsc.compose.proof.context import lines_write, never_run
@@ -328,6 +329,21 @@ def test_clauses_are_an_invariant_only_where_no_cycle_breaks_them() -> None:
         assert (Answer.SATISFIABLE in said) == breaks, clauses
         begins = any(inside((True, False), cube) for cube in clauses)
         assert (asked.first_question(clauses, first).check() is Answer.SATISFIABLE) == begins, clauses
+
+
+@pytest.mark.parametrize("effort", [None, LITTLE])
+def test_a_level_is_proved_with_the_effort_that_is_given(
+    effort: Effort | None, upper: TransitionSystem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def noted(_: TransitionSystem, given: Effort, __: object) -> LevelProof:
+        asked.append(given)
+        return LevelProof("upper", (), (), (), 0, 0, 0.0)
+
+    monkeypatch.setattr(level_proof, "_in_each_cycle", noted)
+    assert prove_level(upper, effort).level == "upper"
+    assert asked == [effort or Effort()]
 
 
 def test_a_level_is_proved_again_with_the_clauses_that_it_has() -> None:

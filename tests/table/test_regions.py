@@ -664,6 +664,15 @@ def test_of_products_two_lines_that_meet_and_inputs_that_none_matches_are_found(
         assert (fault is smt.Answer.SATISFIABLE) == meets
 
 
+@pytest.mark.parametrize(("least_", "covers"), [(7, True), (8, False)])
+def test_nothing_is_left_to_default_only_where_the_solver_says_that_lines_take_all(
+    least_: int, covers: bool
+) -> None:
+    decision = deciding(HYPERBOLA.replace("(x + 1) * y >= 7 + y", f"x * y >= {least_}").replace("\n}", "\n| d | DEFAULT ||\n}"))
+    assert decision.covered(Search()) is covers
+    assert [type(each) for each in decision.decided().findings] == ([] if covers else [Gap])
+
+
 def test_a_table_of_products_has_a_certificate_of_its_own_that_rests_on_the_solver() -> None:
     program = compiled(HYPERBOLA)
     assert relational.certificate_alone(program, program.tables[0], BOXES) is not None
