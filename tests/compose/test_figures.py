@@ -22,11 +22,19 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.claims import RESTING as RESTS
 from rcsc.compose.contract.environment import Above, _admits, links
-from rcsc.compose.contract.obligations import Sort, Unstated, command_stays, obligations, pairs, unstated
+from rcsc.compose.contract.obligations import (
+    Obligation,
+    Sort,
+    Unstated,
+    command_stays,
+    obligations,
+    pairs,
+    unstated,
+)
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.properties import every_predicate, properties
 from rcsc.compose.contract.transition import REFUSED, Cycle, TransitionSystem
-from rcsc.compose.contract.watched import opened
+from rcsc.compose.contract.watched import Refusals, judged, opened
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, FoundInvariant
@@ -34,7 +42,7 @@ from rcsc.compose.proof import assume_guarantee, termination
 from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof import system as system_proof
 from rcsc.compose.proof.assume_guarantee import _of_ending, _said, of_level, promises
-from rcsc.compose.proof.context import lines_write, never_run
+from rcsc.compose.proof.context import Context, lines_write, never_run
 from rcsc.compose.proof.level import (
     LevelProof,
     ProvedTogether,
@@ -52,6 +60,7 @@ from rcsc.proof.solvers.options import Limits
 from rcsc.proof.solvers.smt import Answer, Solver
 from rcsc.proof.symbolic import values
 from rcsc.proof.symbolic.keyed import Keyed
+from rcsc.proof.symbolic.trial import value_at
 from rcsc.run.description import BadDescription, Description, Wire, description
 from tests.support.programs.systems import (
     LITTLE,
@@ -331,6 +340,29 @@ def test_clauses_are_an_invariant_only_where_no_cycle_breaks_them() -> None:
         assert (asked.first_question(clauses, first).check() is Answer.SATISFIABLE) == begins, clauses
 
 
+def test_what_is_proved_only_where_nothing_is_refused_is_told_from_the_rest() -> None:
+    """Of two proofs, the first with refusals: what that one does not show trusts that there are none."""
+    owed = [Obligation(sort, "", "", values.TRUE) for sort in (Sort.SAFE, Sort.ECHOES)]
+    ends, late = Ending("work", 1), Ending("rest", 0)
+
+    def part(verdicts: tuple[Verdict, Verdict], **rest: object) -> LevelProof:
+        pairs_ = tuple(zip(owed, verdicts, strict=True))
+        return replace(LevelProof("l", pairs_, (), (), 0, 0, 0.0), **rest)  # type: ignore[arg-type]  # of its own names
+
+    both = Verdict.PROVED, Verdict.PROVED
+    refusing = part((Verdict.PROVED, Verdict.NOT_PROVED), endings=(ends,))
+    other = part(both, endings=(ends, late), stands=True, context=Context((), (), restless=False))
+    proof = replace(other, parts=(refusing, other))
+    assert [proof.needs_admission(one.key) for one in owed] == [False, True]
+    assert [proof.ends_admitting(one) for one in (ends, late)] == [False, True]
+    assert (proof.stands_admitting, proof.looked_admitting) == (True, True)
+    alike = replace(other, parts=(other, other))
+    for whole in (other, alike):
+        assert not any(whole.needs_admission(one.key) for one in owed)
+        assert not any(whole.ends_admitting(one) for one in (ends, late))
+        assert (whole.stands_admitting, whole.looked_admitting) == (False, False)
+
+
 @pytest.mark.parametrize("effort", [None, LITTLE])
 def test_a_level_is_proved_with_the_effort_that_is_given(
     effort: Effort | None, upper: TransitionSystem, monkeypatch: pytest.MonkeyPatch
@@ -605,6 +637,44 @@ def test_each_part_of_a_property_that_reads_a_refused_input_is_true_or_false() -
     [stated] = ts.program.properties
     node, _ = opened(stated.condition, frozenset({"a"}), ts.havoc())
     assert set(values.variables([node])) == {f"{REFUSED}: (< a int:3)", f"{REFUSED}: (> n a)", "n"}
+
+
+@pytest.mark.parametrize("says", ["x > was x", "was x > 1", "x > 1"])
+@pytest.mark.parametrize("at_restarts", [True, False])
+def test_a_property_of_a_refused_cycle_is_what_it_is_but_where_it_reads_what_was_refused(
+    says: str, at_restarts: bool
+) -> None:
+    """There it may be true or false: of an input that a restart does not clamp, or of any that is refused, then and in the cycle after."""
+    ts = alone(
+        f"input x : int 0 .. 2\nproperty p : {says}\ntable t {{\n| line | x ||\n| any | ||\n}}\nlevel solo {{ period 40 [ms] table t }}\n"
+    )
+    now, was, back = "x", str(earlier(VariableName("x"))), values.variable("back", Bool())
+    leaves = {now: values.variable(now, Int(0, 2)), was: values.variable(was, Int(0, 2))}
+    untaken = values.FALSE if at_restarts else values.variable("untaken", Bool())
+    taken = {} if at_restarts else {now: values.variable("came", Int(0, 2))}
+    looks = frozenset() if at_restarts else frozenset({was})
+    refusals = Refusals(untaken, frozenset({now}), back, looks, taken)
+    truth, defined = judged(ts.program.properties[0].condition, leaves, refusals)
+    assert defined is values.TRUE
+    names = values.variables([truth])
+    unknown = [name for name in names if name not in {now, was, "came", "back", "untaken"}]
+    assert len(unknown) == (says != "x > 1" or not at_restarts)
+    for here, before, came, *flags in product(range(3), range(3), range(3), *[(False, True)] * 3):
+        after, refused, other = flags
+        if at_restarts and refused:
+            continue
+        point = {
+            now: here,
+            was: before,
+            "came": came,
+            "back": after,
+            "untaken": refused,
+            **dict.fromkeys(unknown, other),
+        }
+        reads_now, reads_was = says.startswith("x"), "was" in says
+        open_ = (refused and reads_now) or (after and reads_was)
+        plain = {"x > was x": here > before, "was x > 1": before > 1, "x > 1": here > 1}[says]
+        assert bool(value_at(truth, point)) == (other if open_ else plain), point
 
 
 def test_what_a_property_looks_back_at_is_any_value_after_a_refused_input() -> None:

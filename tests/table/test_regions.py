@@ -668,7 +668,11 @@ def test_of_products_two_lines_that_meet_and_inputs_that_none_matches_are_found(
 def test_nothing_is_left_to_default_only_where_the_solver_says_that_lines_take_all(
     least_: int, covers: bool
 ) -> None:
-    decision = deciding(HYPERBOLA.replace("(x + 1) * y >= 7 + y", f"x * y >= {least_}").replace("\n}", "\n| d | DEFAULT ||\n}"))
+    decision = deciding(
+        HYPERBOLA.replace("(x + 1) * y >= 7 + y", f"x * y >= {least_}").replace(
+            "\n}", "\n| d | DEFAULT ||\n}"
+        )
+    )
     assert decision.covered(Search()) is covers
     assert [type(each) for each in decision.decided().findings] == ([] if covers else [Gap])
 
@@ -797,8 +801,11 @@ def test_inputs_are_counted_where_all_regions_can_be(monkeypatch: pytest.MonkeyP
     )
     assert decision.allowed_in({}) == 45
     assert decision.allowed_in({VariableName("x"): ((3, 4),)}) == 11
+    search = decision.search((0,), covering=True)
+    assert decision.counted(search) == (10, 45)
     monkeypatch.setattr(counting, "inputs", lambda *_: None)
     assert decision.allowed_in({}) is None
+    assert decision.counted(search) is None
 
 
 def test_inputs_that_an_assumption_allows_are_counted_one_by_one_where_it_is_not_linear() -> None:
