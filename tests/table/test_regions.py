@@ -599,7 +599,7 @@ def test_an_input_that_is_known_shows_two_lines_meet_where_no_other_is_found(
     monkeypatch.setattr(relational, "least", lambda *_: NoWitness.UNKNOWN)
     monkeypatch.setattr(TableSolver, "witness", lambda *_, **__: None)
     decision = relational._Decision(program, program.tables[0], BOXES)
-    decision._tried = ()
+    decision._tried = (({"x": 0, "y": 0}, frozenset((0,))),)  # which one of them matches
     found = decision.overlap(0, 1, known, grown=False).finding
     assert found == (Undecided("lines `a` and `b`") if known is None else Overlap(0, 1, {"x": 3, "y": 4}))
 
