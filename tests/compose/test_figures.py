@@ -328,11 +328,11 @@ def test_clauses_are_an_invariant_only_where_no_cycle_breaks_them() -> None:
     def inside(state: tuple[bool, bool], cube: Clause) -> bool:
         return all((state[at] == value) if value >= 0 else (state[at] != ~value) for at, value in cube)
 
-    states = list(product((False, True), repeat=2))
-    after = {(a, b, x): (not (a and x), a and x) for (a, b), x in product(states, (False, True))}
+    states = [(a, b) for a in (False, True) for b in (False, True)]
+    after = {(a, b, x): (not (a and x), a and x) for a, b in states for x in (False, True)}
     for clauses in [*((one,) for one in cubes), *combinations(cubes, 2)]:
         kept = [state for state in states if not any(inside(state, cube) for cube in clauses)]
-        ends = {after[*state, x] for state in kept for x in (False, True)}
+        ends = {after[a, b, x] for a, b in kept for x in (False, True)}
         breaks = any(inside(end, cube) for end in ends for cube in clauses)
         said = {asked.step_question(clauses, case).check() for case in cycle.cases}
         assert (Answer.SATISFIABLE in said) == breaks, clauses

@@ -456,7 +456,7 @@ def _said_of(
     keyed: Keyed, op: Arithmetic, spans: Sequence[tuple[int, int]], point: Sequence[int]
 ) -> tuple[bool, bool]:
     """Whether the result may be what the interpreter computes at these operands, and whether it may be anything else."""
-    operands = [number(f"n{at}", low, high) for at, (low, high) in enumerate(spans)]
+    operands = tuple(number(f"n{at}", low, high) for at, (low, high) in enumerate(spans))
     node = values.arithmetic(op, operands, Int(-99, 99))
     expr = Apply(op, tuple(Literal(value, Int(-9, 9)) for value in point), Int(-99, 99))
     right = keyed.equal(keyed.literal(Int(-99, 99), evaluate(expr, {})), node)

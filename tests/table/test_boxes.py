@@ -451,6 +451,18 @@ def test_z3_need_not_say_whether_default_runs_where_no_gap_is_told() -> None:
     assert confirm(program, program.tables[0], (), Options()) is Agreement.AGREES
 
 
+@pytest.mark.parametrize(
+    ("low", "rest", "kept"),
+    [("<= 1", "", True), ("<= 0", "", False), ("<= 0", "| d | DEFAULT | | ||\n", True)],
+)
+def test_what_z3_alone_decides_has_a_certificate_where_nothing_is_wrong(
+    low: str, rest: str, kept: bool
+) -> None:
+    program = program_of(written([["x", "", "", low], ["y", "", "", "> 1"]]).replace("\n}", f"\n{rest}}}"))
+    verdict = prove_table(program, program.tables[0], Options(solver="z3"))
+    assert (verdict.certificate is not None) == kept
+
+
 STATED = 2 * confirming._OF_A_CELL
 """What it costs to put the two conditions of these tables into Z3's words."""
 
@@ -558,7 +570,7 @@ def test_what_lines_fill_together_is_counted_once_however_many_meet() -> None:
     draw, extent = Random(7), (0, 4)  # noqa: S311 - the same lines in every run
     for _ in range(300):
         spans = [[sorted((draw.randint(0, 4), draw.randint(0, 4))) for _ in "xy"] for _ in range(5)]
-        lines = [
+        lines: list[Mapping[str, Box]] = [
             {name: ((low, high),) for name, (low, high) in zip("xy", line, strict=True)} for line in spans
         ]
         table = partition.Boxes({"x": extent, "y": extent}, lines)

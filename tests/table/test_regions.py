@@ -20,6 +20,7 @@ from rcsc.lang.model import (
     Assumption,
     AssumptionName,
     Bool,
+    Box,
     Column,
     Default,
     Enum,
@@ -800,7 +801,7 @@ def test_inputs_are_counted_where_all_regions_can_be(monkeypatch: pytest.MonkeyP
         "table t assuming less {\n| line | x ||\n| a | < 5 ||\n| d | DEFAULT ||\n}\n"
     )
     assert decision.allowed_in({}) == 45
-    assert decision.allowed_in({VariableName("x"): ((3, 4),)}) == 11
+    assert decision.allowed_in({"x": ((3, 4),)}) == 11
     search = decision.search((0,), covering=True)
     assert decision.counted(search) == (10, 45)
     monkeypatch.setattr(counting, "inputs", lambda *_: None)
@@ -820,7 +821,7 @@ def test_inputs_that_an_assumption_allows_are_counted_one_by_one_where_it_is_not
     assert high - low == 3
     for x in range(10):
         for r in range(low, high + 1):
-            region = {VariableName("x"): ((x, 9),), VariableName("r"): ((low, r),)}
+            region: dict[str, Box] = {"x": ((x, 9),), "r": ((low, r),)}
             assert decision.allowed_in(region) == max(0, 6 - x) * (r - low + 1)
 
 
