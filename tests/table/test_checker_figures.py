@@ -816,7 +816,7 @@ HALF, ONE, GREAT = real_key(0.5), real_key(1.0), 2**64
 REGIONS: list[tuple[dict[str, int], int, int]] = [
     ({"x": 1}, 1, 2), ({"p": 1}, 0, 0), ({"x": 2, "y": -3}, -1, 4), ({"p": 1, "x": 1}, 1, 3), ({"r": 1}, 0, HALF),
     ({"r": 1}, -ONE, 0), ({"r": 1}, -GREAT, GREAT), ({"r": 1, "s": -1}, 1, GREAT), ({"r": 1, "s": -1}, 0, GREAT),
-    ({"r": 1, "s": -1}, -GREAT, 0), ({"r": 1, "s": -1}, -GREAT, -1),
+    ({"r": 1, "s": -1}, -GREAT, 0), ({"r": 1, "s": -1}, -GREAT, -1), ({"q": 1}, 1, 1), ({"q": 1, "x": -1}, -2, 0),
 ]  # fmt: skip
 
 
