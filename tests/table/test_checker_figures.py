@@ -13,6 +13,7 @@ import pytest
 from rcsc.lang.interpret import evaluate
 from rcsc.lang.model import Apply, Bool, Box, Int, Program, Real, Single, Snapshot, key_of, real_key
 from rcsc.proof.certify import certify
+from rcsc.proof.certify import table as checked_table
 from rcsc.proof.certify.execution import Run, Start
 from rcsc.proof.certify.known import KnownSpans
 from rcsc.proof.certify.owed import Debts
@@ -810,6 +811,13 @@ def test_a_condition_of_one_leaf_is_tried_at_all_its_values_and_no_others(
     [test] = [test for test in checker.table.lines[0].tests if test is not None]
     assert isinstance(test.condition, Apply)
     assert checker.tried(test.condition.args[0], "x") == box
+
+
+def test_as_many_lines_as_may_be_are_left_to_be_settled_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checked_table, "MOST_PAIRED", 2)
+    checker = checker_of("x < y", "p", "x >= y")
+    assert [checker.left({}, list(range(many))) for many in (1, 2, 3)] == [True, True, False]
+    assert len(checker.questions) == 2
 
 
 HALF, ONE, GREAT = real_key(0.5), real_key(1.0), 2**64

@@ -128,7 +128,6 @@ class Given:
         points: Keys such that every value does as one of these does; empty if its values are told apart in other ways than by constants.
     """
 
-    kind: Scalar
     word: Word
     points: tuple[int, ...] = ()
 
@@ -276,10 +275,9 @@ def _frame(
 def _given(gates: Gates, read: Sequence[Node], leaves: frozenset[str]) -> Iterator[tuple[str, Given]]:
     """Yield each variable that is no leaf, with the points that tell its values apart."""
     points = points_of(read)
-    kinds = {node.name: node.kind for node in parts_first(*read) if node.op is Shape.VARIABLE}
     for name, word in gates.named.items():
         if name not in leaves:
-            yield name, Given(kinds[name], word, points[name])
+            yield name, Given(word, points[name])
 
 
 def points_of(read: Sequence[Node]) -> dict[str, tuple[int, ...]]:
