@@ -148,9 +148,9 @@ def of_requirement(name: str) -> ObligationKey:
 
 
 def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
-    """List all obligations of a level, those of its tables first; or the one that is asked about (`TransitionSystem.only`)."""
+    """List all obligations of a level, those of its tables first; or those that are asked about (`TransitionSystem.only`)."""
     if ts.only is not None:
-        about = {of_requirement(ts.only), (Sort.PROPERTY, "", ts.only)}
+        about = {key for name in ts.only for key in (of_requirement(name), (Sort.PROPERTY, "", name))}
         return tuple(owed for owed in _stated(ts, cycle) if owed.key in about)
     return (
         *_tables(cycle),

@@ -213,7 +213,7 @@ class TransitionSystem:
         clamped: The inputs that properties look back at and cycles move to the edge: where the level begins anew, none has done so yet.
         refuses: Whether cycles that an input ends are cycles, too, and inputs stand as they came where the level begins anew; else nothing
             is refused or stands outside its range, which is then to be trusted.
-        only: The requirement that alone is owed, by name; None where all is.
+        only: The requirements that alone are owed, by name; None where all is.
     """
 
     program: Program
@@ -221,7 +221,7 @@ class TransitionSystem:
     links: Links
     safety: Safety = Safety()
     refuses: bool = False
-    only: str | None = None
+    only: tuple[str, ...] | None = None
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
     inputs: tuple[str, ...] = field(init=False)

@@ -3,7 +3,7 @@
 In: a circuit. Out: literals of the last cycle, under which there is such a run or none.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.compose.exact.circuit import EARLY, Circuit, Frame
@@ -76,6 +76,11 @@ class Unrolled:
             bits.append(-self.same(half, carry))
             carry = -self._both(-self._both(half, carry), -self._both(one, -other))
         return tuple(bits)
+
+    def never(self, names: Iterable[str]) -> list[Literal]:
+        """Return the literals that none of these truth values, which the environment gives, holds in any cycle."""
+        words = [self.circuit.given[name].word for name in names if name in self.circuit.given]
+        return [-of[bit] for of in self._inputs for (bit,) in words if bit in of]
 
     def given(self) -> list[dict[str, int]]:
         """Return what the environment gives in each cycle of the last model, by variable."""

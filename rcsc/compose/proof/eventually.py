@@ -121,7 +121,9 @@ def _ranks(ts: TransitionSystem, stated: Property) -> Iterator[Try]:
 def _stands_on_walks(bounded: TransitionSystem, most: int) -> bool:
     """Return whether no walk breaks the bound."""
     rounds = next(
-        monitor.still[0] for stated, monitor in monitors(bounded.program) if stated.name == bounded.only
+        monitor.still[0]
+        for stated, monitor in monitors(bounded.program)
+        if stated.name in (bounded.only or ())
     )
     walks = (Walk(bounded, Random(seed)).states(WALK) for seed in range(WALKS))  # noqa: S311  # the same walks each time
     return all(state[rounds] <= most for walk in walks for state in walk)
@@ -166,7 +168,7 @@ def _rank(ts: TransitionSystem, leaf: str, *, rises: bool) -> Rank:
 def _with(ts: TransitionSystem, stated: Property) -> TransitionSystem:
     """Return the level that owes nothing but this requirement."""
     properties = tuple(stated if one.name == stated.name else one for one in ts.program.properties)
-    return replace(ts.of(replace(ts.program, properties=properties)), only=stated.name)
+    return replace(ts.of(replace(ts.program, properties=properties)), only=(stated.name,))
 
 
 def ended_or_ordered(ts: TransitionSystem, below: Below) -> Expr:

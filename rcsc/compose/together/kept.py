@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from rcsc.base.host.cache import Cache
 from rcsc.compose.proof.candidates import content
-from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import Across, Question, Surroundings
+from rcsc.compose.together.product import Surroundings, Timing
+from rcsc.compose.together.proof import Across, Question
 from rcsc.proof.solvers import smt
 
 if TYPE_CHECKING:

@@ -4,17 +4,19 @@ In: levels together, a run of their circuit. Out: for each tick the cycles of th
 requirement, by its monitor stepped along the run. `rerun` repeats the same on the Python and the C executors.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import lcm
 
 from rcsc.compose.contract.given import refused
-from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.obligations import obligations
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
-from rcsc.compose.exact.circuit import Circuit
+from rcsc.compose.exact.bounded import Looked, looked_without
+from rcsc.compose.exact.circuit import Circuit, circuit
 from rcsc.compose.exact.eventual import Lasso
 from rcsc.compose.exact.explicit import Run
-from rcsc.compose.together.product import NOW, Tick, Together
+from rcsc.compose.together.product import EVERY, NOW, Surroundings, Tick, Together
 from rcsc.lang.interpret import Fault, holds, initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Expr, Property, Value, VariableName, earlier, value_of_key
@@ -23,6 +25,8 @@ from rcsc.lang.over_time.run import Watch
 from rcsc.lang.restart import NUMBERS, After, Fixed, SameAs, Stands
 from rcsc.proof.symbolic.values import Node
 
+CONFLICTS = 500
+"""Conflicts of the search for short runs that break a requirement, in all surroundings together."""
 State = dict[str, Value]
 Ticks = tuple[Mapping[str, CycleRun], ...]
 MOST_PLAYED = 200
@@ -369,6 +373,46 @@ def _failed(run: PlayedRun) -> set[tuple[int, str, str]]:
         for name, step in tick.items()
         for one in (*step.failed, *(one for stage in step.stages for one in stage.failed))
     }
+
+
+@dataclass(frozen=True, slots=True)
+class ShortRuns:
+    """The shortest runs of levels that break requirements: of all of them, and in all surroundings, in one search.
+
+    Attributes:
+        ts: The levels, in the hardest surroundings.
+        made: Their circuit.
+        found: What the search found in each surroundings.
+    """
+
+    ts: Together
+    made: Circuit
+    found: Mapping[Surroundings, Looked]
+
+    @classmethod
+    def of(cls, ts: Together, most: int) -> "ShortRuns":
+        """Look for runs of at most so many ticks."""
+        step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+        made = circuit(ts, firsts, step, obligations(ts, step))
+        never = [tuple(_never(around, (*firsts, step))) for around in EVERY]
+        return cls(ts, made, dict(zip(EVERY, looked_without(made, most, never, CONFLICTS), strict=True)))
+
+    def breaking(self, stated: Property, around: Surroundings) -> tuple[PlayedRun, int]:
+        """Return the shortest run that breaks one, as the interpreter does it, and how long no run is that does."""
+        found = self.found[around]
+        for key, run in found.runs.items():
+            if key[-1] == stated.name:
+                return plainest(self.ts, self.made, run, stated) or PlayedRun(), len(run.given) - 1
+        cycles = next((until for key, until in found.until.items() if key[-1] == stated.name), found.cycles)
+        return PlayedRun(), cycles
+
+
+def _never(around: Surroundings, ticks: Sequence[Cycle]) -> Iterator[str]:
+    """Yield the names of what does not befall levels there."""
+    for tick in ticks:
+        assert isinstance(tick, Tick)
+        for happens, of in ((around.restarts, tick.restarts), (around.refuses, tick.refuses)):
+            yield from (node.name for node in of.values() if not happens and not node.known)
 
 
 def _gives_the_same(ts: Together, one: PlayedRun | None, other: PlayedRun) -> bool:

@@ -41,11 +41,24 @@ from rcsc.compose.contract.transition import (
 )
 from rcsc.compose.contract.watched import Refusals, first_ghosts, ghosts_after, kept, monitors
 from rcsc.lang.leaves import spoken_of
-from rcsc.lang.model import BEFORE, Bool, Int, Kind, Level, OneTable, Program, Property, Scalar, TableName
+from rcsc.lang.model import (
+    BEFORE,
+    Bool,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Program,
+    Property,
+    Real,
+    Scalar,
+    TableName,
+)
 from rcsc.lang.operator_table import Op
 from rcsc.lang.over_time.past import FALSE as NEVER
 from rcsc.lang.restart import SameAs
 from rcsc.proof.symbolic import values
+from rcsc.proof.symbolic.opened import Opened
 from rcsc.proof.symbolic.values import FALSE, TRUE, Node
 from rcsc.run.description import Description
 
@@ -57,6 +70,27 @@ LATE = f"{GHOST}late"
 """Of ghosts: by how many ticks a reader last saw a buffer late, and what it held some ticks ago."""
 STOOD = f"{GHOST}as it stood"
 """Of ghosts: an input in the tick before which a level may have begun anew, since it ran last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What may befall the levels.
+
+    Attributes:
+        refuses: Whether inputs may be refused; `restarts`, whether a level may begin anew.
+    """
+
+    refuses: bool = True
+    restarts: bool = True
+
+
+EVERY = (
+    Surroundings(),
+    Surroundings(refuses=False),
+    Surroundings(restarts=False),
+    Surroundings(refuses=False, restarts=False),
+)
+"""Surroundings from the hardest on."""
 
 
 class Timing(StrEnum):
@@ -127,6 +161,7 @@ class Together(TransitionSystem):
         kept: For each level, the inputs that matter as they stood in the tick in which it begins anew, where it need not run then.
         restarting: Whether levels may begin anew.
         most_late: How many ticks late buffers are seen at most, where timing is *late*.
+        opens: Whether reals may be anything after every tick, and all that they decide: what holds so holds where they are what they are.
     """
 
     members: Mapping[str, TransitionSystem] = field(default_factory=dict)
@@ -136,6 +171,7 @@ class Together(TransitionSystem):
     timing: Timing = Timing.SCHEDULED
     restarting: bool = True
     most_late: int = 0
+    opens: bool = False
     wired: dict[str, str] = field(init=False)
     given: dict[str, Scalar] = field(init=False)
     held: dict[str, Source] = field(init=False)
@@ -249,6 +285,21 @@ class Together(TransitionSystem):
         return self._tick(before, suffix, first=False)
 
     def _tick(self, before: Leaves, suffix: str, *, first: bool) -> Tick:
+        tick = self._ticked(before, suffix, first=first)
+        return self._opened(tick, suffix) if self.opens else tick
+
+    def _opened(self, tick: Tick, suffix: str) -> Tick:
+        """Return the tick in which reals tell nothing; nor is it known that each level goes on."""
+        opened = Opened(suffix)
+        after = {
+            leaf: values.variable(f"{leaf} is open{suffix}", self.kinds[leaf])
+            if isinstance(node.kind, Real)
+            else opened.node(node)
+            for leaf, node in tick.after.items()
+        }
+        return replace(tick, contract=opened.node(tick.contract), after=after, tables=())
+
+    def _ticked(self, before: Leaves, suffix: str, *, first: bool) -> Tick:
         cycles, late = dict[str, Cycle](), self._late(suffix)
         due, restarts, takes = dict[str, Node](), dict[str, Node](), dict[str, Leaves]()
         stops = {name: values.variable(f"{name} is stopped{suffix}", Bool()) for name in self.kept}
@@ -417,7 +468,7 @@ def together(
     system: Description,
     program: Program,
     timing: Timing,
-    only: str,
+    *only: str,
 ) -> Together:
     """Make one transition system of some levels; what the others write is as their contract has it.
 
@@ -427,7 +478,7 @@ def together(
         system: The description.
         program: The requirements.
         timing: When the levels run.
-        only: The requirement that is asked about.
+        only: The requirements that are asked about.
     """
     chosen = [name for name in systems if name in set(names)]
     sources = dict(_sources(system, systems))
@@ -467,9 +518,9 @@ def _known(chosen: Collection[str], sources: Mapping[str, Source]) -> Iterator[s
             yield end
 
 
-def _about(program: Program, only: str, known: Collection[str]) -> Program:
-    """Return the program with the one requirement, and with the assumptions that these levels and their parties can tell of."""
-    properties = tuple(stated for stated in program.properties if stated.name == only)
+def _about(program: Program, only: Collection[str], known: Collection[str]) -> Program:
+    """Return the program with some requirements, and with the assumptions that these levels and their parties can tell of."""
+    properties = tuple(stated for stated in program.properties if stated.name in only)
     environment = tuple(
         stated
         for stated in program.environment

@@ -7,7 +7,10 @@ buffers may be, and then under the *scheduled* one: of these levels, then with t
 may do all that its contract allows, so that a proof of few levels is one of all, and costs what they cost. A run is looked for of all
 levels together, and shown only if the interpreter does it.
 
-1. short runs, by bounded search;
+Where a requirement reads no real, all that follows is tried first with reals left open (`Together.opens`), which takes a tenth of the
+clauses of a level that moves something; the invariant is confirmed with the reals as they are, and the interpreter does each run.
+
+1. short runs, by bounded search: of all requirements of the same levels, and in all surroundings, in one;
 2. invariants over predicates of all levels, confirmed by Z3: first of the kindest surroundings, which costs least, then with its clauses of
    harder ones; what these leave open goes to the exact engines (`exact.portfolio`);
 3. longer runs.
@@ -25,13 +28,12 @@ from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.contract.watched import can_be_kept
-from rcsc.compose.exact.bounded import looked
 from rcsc.compose.exact.circuit import circuit
 from rcsc.compose.exact.eventual import Waits
 from rcsc.compose.exact.portfolio import helped
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.pdr import PDR, Clause, Posed
-from rcsc.compose.invariant.search import LIMITS, FoundInvariant, placed
+from rcsc.compose.invariant.search import LIMITS, FoundInvariant, NamedClause, placed
 from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
 from rcsc.compose.together.eventually import (
@@ -46,9 +48,17 @@ from rcsc.compose.together.eventually import (
     within,
 )
 from rcsc.compose.together.features import features, of_member, unlike
-from rcsc.compose.together.played import PlayedRun, Ticks, plainest, played_lasso
-from rcsc.compose.together.product import Timing, Together, read_by_all, together, writers
-from rcsc.lang.model import Program, Property
+from rcsc.compose.together.played import PlayedRun, ShortRuns, Ticks, played_lasso
+from rcsc.compose.together.product import (
+    EVERY,
+    Surroundings,
+    Timing,
+    Together,
+    read_by_all,
+    together,
+    writers,
+)
+from rcsc.lang.model import Program, Property, Real
 from rcsc.lang.over_time.past import FALSE, TRUE, negation
 from rcsc.proof.solvers.sat import QUESTIONS, GaveUpError
 from rcsc.run.description import Description
@@ -57,33 +67,14 @@ SHORT, LONG = 8, 60
 """Ticks of the runs that are looked for before a proof is tried, and after it."""
 MOST_STEPS = 10_000_000
 """What Spacer gets for a requirement, in steps: less than 10 s."""
-FEWEST, HARDER = 1_000, 2
+FEWEST, HARDER = 300, 1
 """How often the SAT solver is asked of harder surroundings, at least, and how many times as often as of the kindest."""
+AT_FIRST = 4_000
+"""How often it is asked at most where reals are left open."""
 NO_RESTART = "no level begins anew while the system runs"
 """What is trusted where levels do not begin anew."""
 NEVER_LATE = "no buffer is seen late"
 """What is trusted where the system says that buffers may be, and a requirement is proved only of such as are not."""
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What may befall the levels.
-
-    Attributes:
-        refuses: Whether inputs may be refused; `restarts`, whether a level may begin anew.
-    """
-
-    refuses: bool = True
-    restarts: bool = True
-
-
-EVERY = (
-    Surroundings(),
-    Surroundings(refuses=False),
-    Surroundings(restarts=False),
-    Surroundings(refuses=False, restarts=False),
-)
-"""Surroundings from the hardest on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +102,7 @@ class Across:
     timing: Timing = Timing.SCHEDULED
     levels: tuple[str, ...] = ()
     by: str = ""
-    around: Surroundings = Surroundings()
+    around: Surroundings = EVERY[0]
     late: int = 0
     run: Ticks = field(default=(), repr=False)
     run_late: tuple[Mapping[str, int], ...] = ()
@@ -169,6 +160,19 @@ class Across:
 
 
 @dataclass(frozen=True, slots=True)
+class Earlier:
+    """What was found for requirements of a system, and may help others.
+
+    Attributes:
+        runs: The short runs that were looked for.
+        clauses: Those of the invariants that show some, under a timing and in surroundings: worth a try.
+    """
+
+    runs: dict[tuple[object, ...], ShortRuns] = field(default_factory=dict)
+    clauses: dict[tuple[Timing, Surroundings], dict[NamedClause, None]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """One requirement of a system.
 
@@ -178,6 +182,9 @@ class Question:
         program: The requirements.
         stated: The one that is asked about.
         proofs: Of levels alone, those that there are: their invariants hold of the levels together, too.
+        opens: Whether reals are left open.
+        shares: Whether other requirements of the program are asked about, too: then their short runs are looked for in one search.
+        earlier: What was found so.
     """
 
     systems: Mapping[str, TransitionSystem]
@@ -185,6 +192,9 @@ class Question:
     program: Program
     stated: Property
     proofs: Mapping[str, LevelProof] = field(default_factory=dict)
+    opens: bool = False
+    shares: bool = False
+    earlier: Earlier = field(default_factory=Earlier, repr=False, compare=False)
 
     @property
     def every(self) -> tuple[str, ...]:
@@ -197,29 +207,68 @@ class Question:
         monitor = self.stated.monitor
         if not found.proved or monitor is None or monitor.asks == TRUE:
             return found
-        return replace(found, vacuous=self._never_asked.verdict(soon=True).proved)
+        return replace(found, vacuous=self._never_asked.soon_proved(found))
 
     def asks(self) -> Across:
         """Answer whether nothing ever asks for its response; what refutes that is a run that does."""
-        return self._never_asked.verdict()
+        found = self._never_asked.verdict()
+        return replace(found, stated=replace(found.stated, name=self.stated.name))
 
     @property
     def _never_asked(self) -> "Question":
-        assert self.stated.monitor is not None
-        monitor = replace(self.stated.monitor, waits=FALSE)
-        never = replace(self.stated, condition=negation(monitor.asks), monitor=monitor)
-        return replace(self, program=replace(self.program, properties=(never,)), stated=never)
+        return replace(self, stated=never_asked(self.stated))
+
+    def soon_proved(self, like: Across) -> bool:
+        """Return whether it is proved as another requirement is, or of all levels as they are scheduled, by no more than a short search."""
+        if not self.opens and self._ways()[0].opens:
+            return self._ways()[0].soon_proved(like)
+        if self._run(EVERY[0], SHORT, Timing.SCHEDULED)[0].ticks:
+            return False
+        parts = dict.fromkeys(((like.timing, like.levels), (Timing.SCHEDULED, self.every)))
+        little = Shown(FoundInvariant())
+        return any(self._proved(part, like.around, begun=little) is not None for part in parts)
 
     def verdict(self, *, soon: bool = False) -> Across:
         """Prove it or refute it; if soon, leave open what takes more than short runs and invariants over predicates."""
-        ts = self.together(self.every, Timing.SCHEDULED, EVERY[0])
-        assumed = tuple(one.name for one in ts.program.environment)
-        stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
-        found = Across(
-            self.stated, levels=self.every, late=self.system.late_ticks, assumed=assumed, stuck=stuck
-        )
+        found = self._begun()
         if may_wait(self.stated):
             return self._eventually(found)
+        left: tuple[tuple[Surroundings, Timing], ...] = ()
+        for one in self._ways():
+            found, left = one.looked_for(found, soon=soon)
+            if found.proved or soon or not left:
+                return found
+        return self._with_effort(found, left)
+
+    def _ways(self) -> tuple["Question", ...]:
+        """List the ways to ask: with reals left open, where it reads none and some level has any, which costs least; then as they are."""
+        read = read_by_all(self.stated)
+        reals = {
+            f"{name}.{leaf}"
+            for name, ts in self.systems.items()
+            for leaf, kind in ts.kinds.items()
+            if isinstance(kind, Real)
+        }
+        reals |= {str(v.name) for v in self.program.variables if isinstance(v.type, Real)}
+        return (replace(self, opens=True), self) if reals and not read & reals else (self,)
+
+    def _begun(self) -> Across:
+        """Return it as open, and tell whether what is assumed can always be kept."""
+        ts = self.together(self.every, Timing.SCHEDULED, EVERY[0]) if self.program.environment else None
+        assumed = () if ts is None else tuple(one.name for one in ts.program.environment)
+        stuck = (
+            ts is not None
+            and bool(assumed)
+            and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
+        )
+        return Across(
+            self.stated, levels=self.every, late=self.system.late_ticks, assumed=assumed, stuck=stuck
+        )
+
+    def looked_for(
+        self, found: Across, *, soon: bool
+    ) -> tuple[Across, tuple[tuple[Surroundings, Timing], ...]]:
+        """Look for short runs and for invariants over predicates; return what is worth more effort, too."""
         left = list[tuple[Surroundings, Timing]]()
         in_kindest = dict[_Part, Shown | None]()
         little = Shown(FoundInvariant()) if soon else None
@@ -230,9 +279,8 @@ class Question:
                 if part[0] not in broken and self._proved_at_last(in_kindest, part, around, little):
                     late = any(found.run_late)
                     kindest = self._kindest(found, self._timings[0]) if late else found
-                    return self._as_proved(kindest, *part, around, "")
-        effort = dict.fromkeys((*left[: len(self._timings)], *left[-1:]))
-        return found if soon else self._with_effort(found, tuple(effort))
+                    return self._as_proved(kindest, *part, around, ""), ()
+        return found, tuple(dict.fromkeys((*left[: len(self._timings)], *left[-1:])))
 
     def _eventually(self, found: Across) -> Across:
         """Prove within which bound it comes, or refute it: by a run that a tick breaks, or one on which it waits for ever."""
@@ -378,7 +426,12 @@ class Question:
     ) -> "Shown | None":
         timing, names = part
         lemmas = tuple(self._lemmas(names, around))
-        return proved(self.together(names, timing, around), lemmas, exact=exact, begun=begun)
+        known = self.earlier.clauses.setdefault((timing, around), {})
+        ts = self.together(names, timing, around)
+        shown = proved(ts, lemmas, exact=exact, begun=begun, candidates=tuple(known))
+        if shown is not None and self.shares:
+            known.update(dict.fromkeys(shown.own))
+        return shown
 
     def _lemmas(self, names: Iterable[str], around: Surroundings) -> Iterator["Lemma"]:
         """Yield the invariants of these levels, each proved of the level alone, in surroundings that are as hard."""
@@ -436,30 +489,52 @@ class Question:
         """Return the levels of a proof, and an invariant that shows the requirement of them once more."""
         if not found.proved:
             return None
-        ts = self.together(found.levels, found.timing, found.around)
         lemmas = tuple(self._lemmas(found.levels, found.around))
-        again = proved(ts, lemmas, exact=bool(found.by))
-        return None if again is None else (ts, again)
+        for one in self._ways():
+            ts = one.together(found.levels, found.timing, found.around)
+            again = proved(ts, lemmas, exact=bool(found.by) and not ts.opens)
+            if again is not None:
+                return replace(ts, opens=False), again
+        return None
 
-    def together(self, names: Sequence[str], timing: Timing, around: Surroundings) -> Together:
-        """Return these levels as one transition system."""
+    def together(
+        self, names: Sequence[str], timing: Timing, around: Surroundings, *asked: Property
+    ) -> Together:
+        """Return these levels as one transition system, about these requirements, or the one that is asked about."""
+        asked = asked or (self.stated,)
         systems = {
             name: ts.refusing() if around.refuses else ts.admitting() for name, ts in self.systems.items()
         }
-        ts = together(systems, names, self.system, self.program, timing, self.stated.name)
-        return replace(ts, restarting=around.restarts)
+        program = replace(self.program, properties=asked)
+        ts = together(systems, names, self.system, program, timing, *(one.name for one in asked))
+        return replace(ts, restarting=around.restarts, opens=self.opens)
 
     # --- runs ---
 
     def _run(self, around: Surroundings, most: int, timing: Timing) -> tuple[PlayedRun, int]:
         """Look for the shortest run of all levels that breaks it, of so many ticks; return it, and how long no run is that does."""
-        ts = self.together(self.every, timing, around)
-        step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
-        made = circuit(ts, firsts, step, obligations(ts, step))
-        found = looked(made, most)
-        for run in found.runs.values():
-            return plainest(ts, made, run, self.stated) or PlayedRun(), len(run.given) - 1
-        return PlayedRun(), found.cycles
+        alike = tuple(self._alike()) if self.shares and most == SHORT else ()
+        asked = alike if self.stated in alike else (self.stated,)
+        key = self.opens, self.every, timing, most, asked
+        if key not in self.earlier.runs:
+            self.earlier.runs[key] = ShortRuns.of(self.together(self.every, timing, EVERY[0], *asked), most)
+        return self.earlier.runs[key].breaking(self.stated, around)
+
+    def _alike(self) -> Iterator[Property]:
+        """Yield the requirements that are about the same levels, and that they are never asked: their short runs are looked for in one."""
+        for one in self.program.properties:
+            if not may_wait(one) and replace(self, stated=one).every == self.every:
+                yield one
+                if one.monitor is not None and one.monitor.asks != TRUE:
+                    yield never_asked(one)
+
+
+def never_asked(stated: Property) -> Property:
+    """Return the requirement that nothing ever asks for the response of this one."""
+    assert stated.monitor is not None
+    monitor = replace(stated.monitor, waits=FALSE)
+    name = f"{stated.name} is asked"
+    return replace(stated, name=name, condition=negation(monitor.asks), monitor=monitor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -488,6 +563,13 @@ class Shown:
     known: Mapping[Clause, tuple[str, int]] = field(default_factory=dict)
     asked: int = 0
 
+    @property
+    def own(self) -> Iterator[NamedClause]:
+        """Yield its clauses that are of no level, with the names of their predicates."""
+        for clause, named in zip(self.invariant.clauses, self.invariant.named, strict=True):
+            if clause not in self.known:
+                yield named
+
 
 _Part = tuple[Timing, tuple[str, ...]]
 """A timing, and the levels that are looked at."""
@@ -499,14 +581,16 @@ def proved(
     *,
     exact: bool = False,
     begun: Shown | None = None,
+    candidates: Sequence[NamedClause] = (),
 ) -> Shown | None:
     """Prove the requirement of levels together; return how, or None.
 
     Args:
-        ts: The levels.
+        ts: The levels; where they leave reals open, that is for the search alone.
         lemmas: What is known of them.
         exact: Whether exact engines try what no invariant over predicates shows.
         begun: How it was proved in kinder surroundings: its clauses are tried first, and the search is given up where it takes far more.
+        candidates: Clauses that are tried, too.
     """
     step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
     wanted = obligations(ts, step)
@@ -518,13 +602,18 @@ def proved(
     chosen = unlike((*known, *features(ts, step, [one.holds for one in wanted])))
     of_levels = dict(_clauses(ts, chosen, lemmas))
     held = tuple(of_levels)
-    found, asked = searched((*firsts, step), owed, chosen, held, begun)
+    most = AT_FIRST if ts.opens else QUESTIONS
+    found, asked = searched((*firsts, step), owed, chosen, held, begun, most, candidates)
     by = ""
     if exact:
         more = helped(ts, firsts, step, wanted, found, MOST_STEPS)
         found, by = more.invariant, next(iter(more.by.values()), "")
     if found.open:
         return None
+    if ts.opens:
+        ts = replace(ts, opens=False)
+        step, firsts = ts.cycle(ts.havoc()), tuple(ts.firsts().values())
+        owed = [obligations(ts, cycle) for cycle in (*firsts, step)]
     for integers in (False, True) if by else (False,):
         with suppress(NotConfirmedError, GaveUpError):
             confirm_owed(found, firsts, step, owed, LIMITS, known=held, exact=integers)
@@ -586,21 +675,24 @@ def searched(
     chosen: tuple[Predicate, ...],
     held: tuple[Clause, ...],
     begun: Shown | None = None,
+    most: int = QUESTIONS,
+    candidates: Sequence[NamedClause] = (),
 ) -> tuple[FoundInvariant, int]:
     """Search an invariant over predicates: of first cycles and a later one, with what each owes, and clauses that are known to hold.
 
     Return it, and how often the solver was asked about a later tick.
     """
     every = range(len(owed[-1]))
-    candidates = () if begun is None else placed(begun.invariant.named, chosen)
-    most = QUESTIONS if begun is None else max(FEWEST, HARDER * begun.asked)
+    named = dict.fromkeys((*(() if begun is None else begun.invariant.named), *candidates))
+    tried = placed(named, chosen)
+    most = most if begun is None else max(FEWEST, HARDER * begun.asked)
     posed = [
         Posed(chosen, cycle, {at: each[at].holds for at in every}, most)
         for cycle, each in zip(cycles, owed, strict=True)
     ]
     weights = [2 if one.parts else int(one.size > 2) for one in chosen]
     try:
-        clauses, left = PDR(posed[:-1], posed[-1], Reached.of(()), weights, held, candidates).search(every)
+        clauses, left = PDR(posed[:-1], posed[-1], Reached.of(()), weights, held, tried).search(every)
     except GaveUpError:
         return FoundInvariant(chosen, held, frozenset(every)), posed[-1].sat.queries
     finally:

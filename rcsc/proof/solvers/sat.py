@@ -76,17 +76,17 @@ class Sat:
         """Assert that one of the literals holds."""
         self._solver.add_clause(clause)
 
-    def holds(self, assuming: Iterable[int]) -> bool:
+    def holds(self, assuming: Iterable[int], most: int = BUDGET) -> bool:
         """Return whether all that is asserted can hold together with these literals.
 
         Raises:
-            GaveUpError: After `BUDGET` conflicts; after so many questions, or conflicts in all, as it may have.
+            GaveUpError: After `most` conflicts; after so many questions, or conflicts in all, as it may have.
         """
         self.queries += 1
-        left = self._conflicts - self._solver.accum_stats()["conflicts"]
+        left = self._conflicts - self.conflicts
         if self.queries > self._questions or left <= 0:
             raise GaveUpError
-        self._solver.conf_budget(min(BUDGET, left))
+        self._solver.conf_budget(min(most, left))
         try:
             # each once: solvers give each a decision level, and may write beyond their memory where they are more than the variables
             answer = self._solver.solve_limited(assumptions=list(dict.fromkeys(assuming)))
@@ -106,6 +106,11 @@ class Sat:
     def core(self) -> frozenset[int]:
         """Return the unsatisfiable core of the assumptions of the last question."""
         return frozenset(self._solver.get_core() or ())
+
+    @property
+    def conflicts(self) -> int:
+        """How many conflicts the answers so far took."""
+        return int(self._solver.accum_stats()["conflicts"])
 
     @property
     def effort(self) -> int:

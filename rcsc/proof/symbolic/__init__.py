@@ -21,9 +21,9 @@ and its procedures), `keyed` (values as bounded integers, for whole cycles of le
 for how far something goes); and clauses in `bits`, for a search whose result is confirmed on integers. `trial` looks
 for counterexamples by running the interpreter where doubles make a solver slow.
 
-Trusted, without `rcsc certify`: everything but `bits` and `trial`, whose results others confirm. A run that is longer
+Trusted, without `rcsc certify`: everything but `opened`, `bits` and `trial`, whose results others confirm. A run that is longer
 than `MOST_STEPS` is not followed, and the program is then not proved.
 
-Modules, in the order the data flows: `values`, `evaluation`, `execution`, then `encode`, `keyed`, `measured`, `bits`,
-`trial`, `remembered` (answers to questions asked before).
+Modules, in the order the data flows: `values`, `evaluation`, `execution`, then `opened`, `encode`, `keyed`, `measured`,
+`bits`, `trial`, `remembered` (answers to questions asked before).
 """
