@@ -35,7 +35,7 @@ from rcsc.compose.proof.system import SystemProof, read_systems
 from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NO_RESTART, Question
+from rcsc.compose.together.proof import NO_RESTART, Earlier, Question
 from rcsc.compose.together.said import timing_of
 from rcsc.compose.together.words import stated_across
 from rcsc.run.description import Description, description
@@ -79,11 +79,11 @@ def _across(
 ) -> Iterator[AcrossClaim]:
     """Yield what is proved across levels, with all that it rests on."""
     stated = stated_across(system, {name: ts.program for name, ts in systems.items()})
-    proofs = {level.level: level for level in proof.levels}
+    proofs, earlier = {level.level: level for level in proof.levels}, Earlier()
     if stated is None:
         return
     for one in stated[0].properties:
-        question = Question(systems, system, stated[0], one, proofs)
+        question = Question(systems, system, stated[0], one, proofs, shares=True, earlier=earlier)
         found = (None if cache is None else recalled(question, cache)) or answered(question, cache)
         closed = found.closed(systems, proof.closed)
         if not closed.proved:

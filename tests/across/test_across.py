@@ -10,8 +10,8 @@ import pytest
 from rcsc.compose.counterexample.explain import TraceSettings
 from rcsc.compose.counterexample.rerun import make
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
-from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, SHORT, Across, Question, Surroundings
+from rcsc.compose.together.product import Surroundings, Timing
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, SHORT, Across, Question
 from rcsc.compose.together.repeated import repeated
 from rcsc.compose.together.words import stated_across
 from rcsc.front.commands import run

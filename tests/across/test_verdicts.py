@@ -16,8 +16,8 @@ from rcsc.compose.exact.eventual import Waits
 from rcsc.compose.proof.level import NotConfirmedError
 from rcsc.compose.together.eventually import ANSWERS, COMES_TO_AN_END, bounds, waits_for
 from rcsc.compose.together.kept import answered, recalled
-from rcsc.compose.together.product import LATE, Timing
-from rcsc.compose.together.proof import EVERY, NEVER_LATE, NO_RESTART, Across, Question, Surroundings
+from rcsc.compose.together.product import EVERY, LATE, Surroundings, Timing
+from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question
 from rcsc.lang.model import Int
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values

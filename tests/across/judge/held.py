@@ -11,8 +11,8 @@ from pathlib import Path
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.system import prove_transition_systems, read_systems
 from rcsc.compose.together.eventually import may_wait, waits_for
-from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import SHORT, Across, Question, Surroundings
+from rcsc.compose.together.product import Surroundings, Timing
+from rcsc.compose.together.proof import SHORT, Across, Question
 from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program
 from rcsc.run.description import Description, description
