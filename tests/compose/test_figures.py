@@ -677,6 +677,23 @@ def test_a_property_of_a_refused_cycle_is_what_it_is_but_where_it_reads_what_was
         assert bool(value_at(truth, point)) == (other if open_ else plain), point
 
 
+def test_a_part_that_may_be_undefined_of_what_was_refused_is_not_kept_but_where_that_is_forgiven() -> None:
+    ts = alone(
+        "input a : int 1 .. 9\nstate n : int 0 .. 9\nproperty low : 10 / a > n\n"
+        "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
+    )
+    condition, leaves = ts.program.properties[0].condition, ts.havoc()
+    assert opened(condition, frozenset({"a"}), leaves) == (values.FALSE, values.FALSE)
+    truth, defined = opened(condition, frozenset({"a"}), leaves, " here", forgives=True)
+    [unknown] = values.variables([truth])
+    assert unknown.startswith(f"{REFUSED} here: ")
+    assert defined is values.TRUE
+    for forgives in (True, False):
+        refusals = Refusals(values.TRUE, frozenset({"a"}), suffix=" here", forgives=forgives)
+        truth, defined = judged(condition, leaves, refusals)
+        assert (list(values.variables([truth])), defined is values.TRUE) == ([unknown] * forgives, forgives)
+
+
 def test_what_a_property_looks_back_at_is_any_value_after_a_refused_input() -> None:
     ts = alone(
         "input a : int 0 .. 9\nstate n : int 0 .. 9\nproperty back : was a < 5 or n < 9\n"
