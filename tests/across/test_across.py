@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Mapping
 from itertools import pairwise
+from math import isnan
 from pathlib import Path
 
 import pytest
@@ -343,6 +344,22 @@ def test_what_only_a_refusal_breaks_is_proved_trusting_that_none_comes(tmp_path:
     assert found.proved
     assert not found.around.refuses
     assert any(step.fault.name == "ADMIT" for tick in found.run for step in tick.values())
+
+
+def test_a_run_with_a_refused_real_is_repeated_though_no_number_is_as_it_was(tmp_path: Path) -> None:
+    """A real is refused as NaN, which is equal to nothing, and stands in interpreter and executors alike."""
+    doubts = (
+        _DOUBTS.replace("int 0 .. 10", "real 0.0 .. 10.0").replace("< 8 ", "< 8.0").replace(">= 8", ">= 8.0")
+    )
+    files = {"left.rcs": doubts.replace("8.0 || false", "8.0 || true")}
+    path = _written(tmp_path, "requirement obeys : whenever boss.go_left, next left.runs\n", files=files)
+    found = _answers(path)["obeys"]
+    assert found.proved
+    assert any(
+        isnan(step.taken["load"]) for tick in found.run for name, step in tick.items() if name == "left"
+    )
+    systems, _ = read_systems(path)
+    assert not repeated(found, systems, TraceSettings(description(path), 8, log=tmp_path / "logs")).beside
 
 
 def test_what_is_assumed_of_a_party_over_time_is_kept_by_every_run(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 from rcsc.code.emit import emitted
 from rcsc.code.emit.c.ctext import c_type, wide_type
 from rcsc.code.emit.lower import lower, lower_by_force
+from rcsc.code.testing.executors.sessions import same_value
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun
@@ -282,7 +283,7 @@ def _beside(
     there = f"tick {tick}, level `{level.name}`"
     count = len(level.sign.leaves)
     for leaf, value in zip(level.sign.leaves, level.values[:count], strict=True):
-        if step.after[leaf.name] != value:
+        if not same_value(step.after[leaf.name], value):
             then = spell(ts.kinds[leaf.name], step.after[leaf.name])
             yield f"{there}: `{leaf.name}` = {then} by the interpreter, {leaf.shown(value)} by the {who} executor"
     expected = _spelled(step.line, step.fault, [name for name in level.sign.monitored if name in step.failed])
