@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Mapping
-from itertools import pairwise
 from math import isnan
 from pathlib import Path
 
@@ -171,7 +170,7 @@ level left { period 10 [ms] table move_left }
 """
 
 
-def test_a_long_run_has_no_restart_no_refusal_and_no_change_of_an_input_that_it_breaks_without(
+def test_a_long_run_has_no_restart_and_no_refusal_that_it_breaks_without(
     tmp_path: Path,
 ) -> None:
     path = _written(tmp_path, "requirement short : always left.ran < 10\n", files={"left.rcs": _COUNTING})
@@ -180,9 +179,6 @@ def test_a_long_run_has_no_restart_no_refusal_and_no_change_of_an_input_that_it_
     steps = [step for tick in found.run for step in tick.values()]
     assert len(found.run) > SHORT
     assert not any(step.anew or step.fault is Fault.ADMIT for step in steps)
-    assert {tick["left"].taken["heat"] for tick in found.run} == {0}
-    wishes = [tick["boss"].taken["wish"] for tick in found.run]
-    assert sum(one != other for one, other in pairwise(wishes)) <= 1
 
 
 def test_a_wire_that_is_crossed_is_found(tmp_path: Path) -> None:

@@ -29,8 +29,6 @@ CONFLICTS = 500
 """Conflicts of the search for short runs that break a requirement, in all surroundings together."""
 State = dict[str, Value]
 Ticks = tuple[Mapping[str, CycleRun], ...]
-MOST_PLAYED = 200
-"""How often a run is played again, at most, to find the inputs that need not change in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,7 +282,7 @@ def _never_back(ts: Together, late: Mapping[str, int], before: Mapping[str, int]
 
 
 def plainest(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedRun | None:
-    """Run a run of the circuit as `played` does, without restarts, late buffers and changes of inputs that need not be.
+    """Run a run of the circuit as `played` does, without those restarts and late buffers that it breaks the requirement without.
 
     Where parties outside keep to a contract, all are kept that change what a level gives, or that are of what those parties give: they
     might not do the same of a run that is another. Where the database is asked, all are.
@@ -309,70 +307,7 @@ def plainest(ts: Together, made: Circuit, run: Run, stated: Property) -> PlayedR
                 plainer = played(ts, made, other, stated)
                 if plainer is not None and (not bound or _gives_the_same(ts, found, plainer)):
                     run, found = other, plainer
-    free = {leaf: party for leaf, party in _outside(ts).items() if party not in outside}
-    return found and _with_still_inputs(ts, made, run, stated, found, free, bound=bound)
-
-
-def _outside(ts: Together) -> dict[str, str]:
-    """Return each variable that no level here writes, of a level or of what stands outside, with the party that does; empty for nobody."""
-    parties = {source.name: source.party for source in ts.sources.values()}
-    taken = {
-        own: ts.sources[own].party if own in ts.sources else ""
-        for name, member in ts.members.items()
-        if not member.program.environment
-        for leaf in member.inputs
-        if (own := f"{name}.{leaf}") not in ts.wired
-    }
-    return {name: parties.get(name, "") for name in ts.given} | taken
-
-
-def _with_still_inputs(
-    ts: Together,
-    made: Circuit,
-    run: Run,
-    stated: Property,
-    found: PlayedRun,
-    free: Mapping[str, str],
-    *,
-    bound: bool,
-) -> PlayedRun:
-    """Return the run with these inputs as they were in the tick before, wherever it breaks the requirement so.
-
-    One input is tried in all ticks at once, then in each tick. What a table assumes holds as before.
-    """
-    places = dict[str, list[tuple[int, str]]]()
-    for at, given in enumerate(run.given):
-        tick = made.step.cycle if at else made.firsts[run.begins].cycle
-        assert isinstance(tick, Tick)
-        told = {f"{name}.{leaf}": node for name, taken in tick.takes.items() for leaf, node in taken.items()}
-        for leaf, node in (told | {name: tick.after[name] for name in ts.given}).items():
-            if leaf in free and not node.known and node.name in given:
-                places.setdefault(leaf, []).append((at, node.name))
-    tried = [*places.values(), *([one] for several in places.values() for one in several)]
-    for one in tried[:MOST_PLAYED]:
-        gone = set(one)
-        still = tuple(
-            {name: key for name, key in each.items() if (at, name) not in gone}
-            for at, each in enumerate(run.given)
-        )
-        if still == run.given:
-            continue  # they went with the input in all ticks
-        plainer = played(ts, made, replace(run, given=still), stated)
-        if plainer is None or _failed(plainer) - _failed(found):
-            continue
-        if not bound or _gives_the_same(ts, found, plainer):
-            run, found = replace(run, given=still), plainer
     return found
-
-
-def _failed(run: PlayedRun) -> set[tuple[int, str, str]]:
-    """Return the assumptions of tables that do not hold in a run, with the tick and the level."""
-    return {
-        (at, name, one)
-        for at, tick in enumerate(run.ticks)
-        for name, step in tick.items()
-        for one in (*step.failed, *(one for stage in step.stages for one in stage.failed))
-    }
 
 
 @dataclass(frozen=True, slots=True)
