@@ -35,7 +35,7 @@ from rcsc.compose.proof.system import SystemProof, read_systems
 from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.product import Timing
-from rcsc.compose.together.proof import NO_RESTART, Earlier, Question
+from rcsc.compose.together.proof import NO_RESTART, questions
 from rcsc.compose.together.said import timing_of
 from rcsc.compose.together.words import stated_across
 from rcsc.run.description import Description, description
@@ -79,11 +79,9 @@ def _across(
 ) -> Iterator[AcrossClaim]:
     """Yield what is proved across levels, with all that it rests on."""
     stated = stated_across(system, {name: ts.program for name, ts in systems.items()})
-    proofs, earlier = {level.level: level for level in proof.levels}, Earlier()
     if stated is None:
         return
-    for one in stated[0].properties:
-        question = Question(systems, system, stated[0], one, proofs, shares=True, earlier=earlier)
+    for question in questions(systems, system, stated[0], proof):
         found = (None if cache is None else recalled(question, cache)) or answered(question, cache)
         closed = found.closed(systems, proof.closed)
         if not closed.proved:
@@ -97,7 +95,7 @@ def _across(
             else Trusted(*trust_of(words), words)
             for words in closed.trusts
         )
-        yield AcrossClaim(one.name, found.timing is not Timing.ANY, timing_of(found), trusts)
+        yield AcrossClaim(found.stated.name, found.timing is not Timing.ANY, timing_of(found), trusts)
 
 
 def proved_claims(path: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> Claims:

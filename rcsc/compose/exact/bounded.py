@@ -14,7 +14,7 @@ from rcsc.proof.solvers.sat import GaveUpError, Sat
 from rcsc.proof.symbolic.bits import FALSE, TRUE, Literal
 
 MOST_GATES, MOST_CONFLICTS = 500_000, 2_000
-"""Gates of all cycles together, and conflicts of a solver: an effort that is the same on every machine."""
+"""Gates of all cycles together, and conflicts for each obligation: an effort that is the same on every machine."""
 
 
 @dataclass(slots=True)
@@ -23,7 +23,7 @@ class Looked:
 
     Attributes:
         runs: The shortest run that breaks each obligation, of those found.
-        cycles: No run of so many cycles breaks any other.
+        cycles: No run of so many cycles breaks any other, but those of `until`.
         until: Those that the solver gave up before, each with of how many cycles no run breaks it.
     """
 

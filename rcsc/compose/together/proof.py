@@ -36,6 +36,7 @@ from rcsc.compose.invariant.pdr import PDR, Clause, Posed
 from rcsc.compose.invariant.search import LIMITS, FoundInvariant, NamedClause, placed
 from rcsc.compose.proof.assume_guarantee import admitted
 from rcsc.compose.proof.level import LevelProof, NotConfirmedError, confirm_owed
+from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.eventually import (
     COMES_TO_AN_END,
     ROUNDS,
@@ -254,16 +255,13 @@ class Question:
 
     def _begun(self) -> Across:
         """Return it as open, and tell whether what is assumed can always be kept."""
-        ts = self.together(self.every, Timing.SCHEDULED, EVERY[0]) if self.program.environment else None
-        assumed = () if ts is None else tuple(one.name for one in ts.program.environment)
-        stuck = (
-            ts is not None
-            and bool(assumed)
-            and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
-        )
-        return Across(
-            self.stated, levels=self.every, late=self.system.late_ticks, assumed=assumed, stuck=stuck
-        )
+        found = Across(self.stated, levels=self.every, late=self.system.late_ticks)
+        if not self.program.environment:
+            return found
+        ts = self.together(self.every, Timing.SCHEDULED, EVERY[0])
+        assumed = tuple(one.name for one in ts.program.environment)
+        stuck = bool(assumed) and not goes_on(ts, tuple(ts.firsts().values()), ts.cycle(ts.havoc()))
+        return replace(found, assumed=assumed, stuck=stuck)
 
     def looked_for(
         self, found: Across, *, soon: bool
@@ -527,6 +525,15 @@ class Question:
                 yield one
                 if one.monitor is not None and one.monitor.asks != TRUE:
                     yield never_asked(one)
+
+
+def questions(
+    systems: Mapping[str, TransitionSystem], system: Description, program: Program, whole: SystemProof
+) -> Iterator[Question]:
+    """Yield a question for each requirement of a system; what is found for one serves those after it."""
+    proofs, earlier = {proof.level: proof for proof in whole.levels}, Earlier()
+    for one in program.properties:
+        yield Question(systems, system, program, one, proofs, shares=True, earlier=earlier)
 
 
 def never_asked(stated: Property) -> Property:

@@ -16,7 +16,7 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.together.kept import answered
-from rcsc.compose.together.proof import Across, Earlier, Question
+from rcsc.compose.together.proof import Across, questions
 from rcsc.compose.together.words import stated_across
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded
@@ -100,11 +100,8 @@ def answers(
     if stated is None:
         return None
     program, loaded = stated
-    proofs = {proof.level: proof for proof in whole.levels}
-    every, earlier = [], Earlier()
-    for one in program.properties:
-        found = answered(
-            Question(systems, settings.system, program, one, proofs, shares=True, earlier=earlier), cache
-        )
+    every = []
+    for question in questions(systems, settings.system, program, whole):
+        found = answered(question, cache)
         every.append((found, repeated(found, systems, settings) if found.run else None))
     return Answers(program, loaded, tuple(every))

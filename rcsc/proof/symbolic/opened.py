@@ -5,11 +5,10 @@ built alike. So whatever holds of all values of the new nodes holds of the old o
 Doubles take most of the clauses of a level that moves something, and few of its requirements rest on what they are.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from rcsc.lang.model import Real
-from rcsc.proof.symbolic.values import Alike, Node, Shape
+from rcsc.proof.symbolic.values import Alike, Node, Shape, parts_first
 
 
 @dataclass(slots=True)
@@ -26,22 +25,9 @@ class Opened:
 
     def node(self, node: Node) -> Node:
         """Return the node with what reals decide left open; a real stays as it is."""
-        for part in self._parts_first(node):
+        for part in parts_first(node, known=self._made, whole=_is_whole):
             self._made[part] = self._of(part)
         return self._made[node]
-
-    def _parts_first(self, node: Node) -> Iterator[Node]:
-        """Yield each node once, parts first, and no part of what is left open."""
-        waiting = [(node, False)]
-        while waiting:
-            now, ready = waiting.pop()
-            if now in self._made:
-                continue
-            if ready or isinstance(now.kind, Real) or decided_by_reals(now):
-                yield now
-            else:
-                waiting.append((now, True))
-                waiting += ((part, False) for part in now.args)
 
     def _of(self, node: Node) -> Node:
         if decided_by_reals(node):
@@ -53,6 +39,11 @@ class Opened:
         if all(new is old for new, old in zip(args, node.args, strict=True)):
             return node
         return Node(node.op, args, node.kind, node.low, node.high, node.name)
+
+
+def _is_whole(node: Node) -> bool:
+    """Return whether it is a real, which stays as it is, or left open: nothing asks for its parts."""
+    return isinstance(node.kind, Real) or decided_by_reals(node)
 
 
 def decided_by_reals(node: Node) -> bool:

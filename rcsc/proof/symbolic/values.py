@@ -8,7 +8,7 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 
 import math
 import sys
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -366,8 +366,10 @@ def model(solver: Solver, nodes: Iterable[Node]) -> dict[str, Value]:
     return {node.name: solver.value(term_of(node), node.kind) for node in nodes}
 
 
-def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
-    """Yield each node once, parts first; leave out known ones and what only they are made of."""
+def parts_first(
+    *nodes: Node, known: Container[Node] = (), whole: Callable[[Node], bool] | None = None
+) -> Iterator[Node]:
+    """Yield each node once, parts first; leave out known ones and what only they are made of, and parts of what is taken whole."""
     seen: set[Node] = set()
     stack = [(node, False) for node in reversed(nodes)]
     while stack:
@@ -377,7 +379,8 @@ def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
         elif node not in seen and node not in known:
             seen.add(node)
             stack.append((node, True))
-            stack.extend((part, False) for part in node.args if part not in seen)
+            if whole is None or not whole(node):
+                stack.extend((part, False) for part in node.args if part not in seen)
 
 
 def conjuncts(condition: Node) -> Iterator[Node]:

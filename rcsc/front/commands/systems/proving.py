@@ -234,14 +234,13 @@ def paged(path: Path, name: str, page: Path, length: int | None, cache: Cache | 
     from rcsc.views.pages.requirement_page import write_requirement
 
     its = read(path, cache)
-    proved_ = whole_proof(read_systems(path)[0], its.described, cache=cache)
-    systems, whole = proved_.systems, proved_.proof
-    its = replace(its, systems=systems)
-    usual = usual_length(systems.values()) if length is None else length
+    whole = whole_proof(read_systems(path)[0], its.described, cache=cache)
+    its = replace(its, systems=whole.systems)
+    usual = usual_length(whole.systems.values()) if length is None else length
     try:
         with scratch("page") as folder:
             settings = TraceSettings(its.described, usual, log=folder)
-            story, log = _story(its, whole, name, settings, cache)
+            story, log = _story(its, whole.proof, name, settings, cache)
             write_requirement(page, story, None if log is None else read_log(log))
     except OSError as error:
         raise UnwritableError(str(page), error.strerror or "no reason given") from error
