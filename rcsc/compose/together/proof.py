@@ -275,9 +275,7 @@ class Question:
             left += [(around, timing) for timing in self._timings if timing not in broken]
             for part in self._parts():
                 if part[0] not in broken and self._proved_at_last(in_kindest, part, around, little):
-                    late = any(found.run_late)
-                    kindest = self._kindest(found, self._timings[0]) if late else found
-                    return self._as_proved(kindest, *part, around, ""), ()
+                    return self._as_proved(found, *part, around, ""), ()
         return found, tuple(dict.fromkeys((*left[: len(self._timings)], *left[-1:])))
 
     def _eventually(self, found: Across) -> Across:
@@ -343,7 +341,7 @@ class Question:
             if not run.ticks:
                 continue
             broken |= {timing, self._timings[0], Timing.ANY}
-            first, kinder = not found.run, timing is Timing.SCHEDULED or not any(found.run_late)
+            first, kinder = not found.run, around != found.broken_in
             if first or len(run.ticks) < len(found.run) or (len(run.ticks) == len(found.run) and kinder):
                 found = replace(found, run=run.ticks, run_late=run.late, broken_in=around)
         if around == EVERY[0]:
@@ -385,10 +383,10 @@ class Question:
         refuse = any(self.systems[name].refusing().refuses for name in self.every)
         yield from (around for around in EVERY if refuse or around.refuses)
 
-    @staticmethod
     def _as_proved(
-        found: Across, timing: Timing, names: tuple[str, ...], around: Surroundings, by: str
+        self, found: Across, timing: Timing, names: tuple[str, ...], around: Surroundings, by: str
     ) -> Across:
+        found = self._kindest(found, self._timings[0]) if any(found.run_late) else found
         return replace(found, proved=True, stuck=False, timing=timing, levels=names, around=around, by=by)
 
     # --- proofs ---
@@ -455,26 +453,18 @@ class Question:
 
     def _named(self) -> tuple[str, ...]:
         """List the levels whose variables it reads, also those of a party outside, by who is at the other end."""
-        ends = {
-            end: other
-            for wire in self.system.wires
-            for end, other in ((wire.source, wire.target), (wire.target, wire.source))
-        }
-        read = read_by_all(self.stated)
         found = set()
-        for name in read:
+        for name in read_by_all(self.stated):
             party = name.partition(".")[0]
-            if party not in self.systems:
-                party = next(
-                    (
-                        o.partition(".")[0]
-                        for end, o in ends.items()
-                        if name == end or name.startswith(f"{end}.")
-                    ),
-                    "",
-                )
-            found.add(party)
+            found |= {party} if party in self.systems else set(self._at_other_ends(name))
         return tuple(name for name in self.systems if name in found)
+
+    def _at_other_ends(self, name: str) -> Iterator[str]:
+        """Yield who reads or writes the buffer of which this is an end, or a leaf of what it holds."""
+        for wire in self.system.wires:
+            for end, other in ((wire.source, wire.target), (wire.target, wire.source)):
+                if name == end or name.startswith(f"{end}."):
+                    yield other.partition(".")[0]
 
     def _reached_from(self, names: Iterable[str], steps: int) -> Iterator[str]:
         """Yield these levels and those that write to them, directly or by so many others."""

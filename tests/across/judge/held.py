@@ -140,7 +140,7 @@ class Held:
         assert true.least == ticks, f"broken in tick {ticks}: {true}"
         least = self.truth(of(broken_in, self.hardest.late)).least
         assert least == ticks, f"broken in tick {ticks} in {broken_in}: {least}"
-        if self.found.proved and any(self.found.run_late) and broken_in.restarts:
+        if any(self.found.run_late) and broken_in.restarts:
             calmer = self.truth(of(replace(broken_in, restarts=False), self.hardest.late)).least
             assert calmer != ticks, f"a run as long needs no restart, as {broken_in} has"
 

@@ -178,9 +178,14 @@ class Member:
         """Return what a cycle keeps that is refused an input."""
         return self.forget(tuple(self.safe.get(at, value) for at, value in enumerate(own)))
 
-    def anew(self, own: Values, taken: Mapping[str, Value], *, stands: bool) -> Values:
+    def empty(self, zero: int) -> dict[str, Value]:
+        """Return what it takes where nothing has arrived, and begins with, if what was first number 0 is now known by another number."""
+        kinds = self.ts.kinds
+        return {leaf: zero if numbered(kinds[leaf]) else first for leaf, first in self.first.items()}
+
+    def anew(self, own: Values, taken: Mapping[str, Value], *, stands: bool, zero: int = 0) -> Values:
         """Return from what it begins anew, whose buffers hold what it gave last, if anything `stands` there."""
-        start = {**self.first, **taken}
+        start = {**self.empty(zero), **taken}
         for leaf, adopted in self.ts.program.adopted.items():
             place = self.own.index(leaf)
             match adopted:
@@ -214,12 +219,14 @@ class Now(NamedTuple):
         levels: The levels.
         given: What parties outside gave, of what requirements read.
         past: Of each buffer that may be late what it held before, the newest first; of one of a party outside, what it holds, too.
+        zero: As what the number 0 is known, with which all levels began: an empty buffer still says it.
     """
 
     at: int
     levels: tuple[Stand, ...]
     given: Values
     past: tuple[tuple[Values | None, ...], ...] = ()
+    zero: int = 0
 
 
 Cycles: TypeAlias = dict[str, dict[tuple[Values, Values], tuple[Values, Values]]]
@@ -305,7 +312,7 @@ class Runs:
         readers = Counter(wire.source for wire in system.wires if wire.target.partition(".")[0] in self.names)
         seen = {at.source for at in self.where.values()}
         alone = [e for e in ends if e.writer is None and readers[e.source] == 1 and e.source not in seen]
-        outside = {leaf for end in ends if end.writer is not None for leaf in end.leaves}
+        others = {leaf for end in ends if end.source.partition(".")[0] in systems for leaf in end.leaves}
         return Member(
             ts,
             max(1, ts.level.period_ms // system.tick_ms),
@@ -315,7 +322,7 @@ class Runs:
             any(
                 refusable(v)
                 for v in ts.program.variables
-                if v.kind is Kind.INPUT and str(v.name) not in outside
+                if v.kind is Kind.INPUT and str(v.name) not in others
             ),
             cycles,
         )
@@ -382,16 +389,16 @@ class Runs:
         past = self._past(now, given)
         for chosen in product(*ways):
             levels = tuple(stand for stand, _ in chosen)
-            yield self._normal(Now(later, levels, shown, past)), all(calm for _, calm in chosen)
+            yield self._normal(Now(later, levels, shown, past, now.zero)), all(calm for _, calm in chosen)
 
     def ways(self, at: int, now: Now, given: Mapping[str, Values]) -> tuple[tuple[Stand, bool], ...]:
         """Return how a level may stand after the tick, and whether nothing befell it."""
         member, stand = self.members[at], now.levels[at]
         contents = tuple(self._contents(end, now, given) for end in member.ends)
         due = now.at % member.period == 0
-        key = due, stand, contents, now.at > 0
+        key = due, stand, contents, now.at > 0, now.zero
         if key not in member.ways:
-            every = self._ways(member, stand, contents, due=due, stands=now.at > 0)
+            every = self._ways(member, stand, contents, now.zero, due=due, stands=now.at > 0)
             member.ways[key] = tuple(dict.fromkeys((after, calm or not self.waits) for after, calm in every))
         return member.ways[key]
 
@@ -414,6 +421,7 @@ class Runs:
         member: Member,
         stand: Stand,
         contents: tuple[tuple[Values | None, ...], ...],
+        zero: int,
         *,
         due: bool,
         stands: bool,
@@ -423,13 +431,14 @@ class Runs:
         free = [values_of(member.ts.kinds[leaf]) for leaf in member.free]
         for by in product(*(range(min(befalls.late, age + 1) + 1) for age in ages)):
             kept = by if befalls.late > 1 else ()
-            taken = {leaf: member.first[leaf] for leaf in member.inputs}
+            first = member.empty(zero)
+            taken = {leaf: first[leaf] for leaf in member.inputs}
             for end, age, held in zip(member.ends, by, contents, strict=True):
                 if (found := held[age]) is not None:
                     taken |= zip(end.leaves, found, strict=True)
             for others in product(*free):
                 taken |= zip(member.free, others, strict=True)
-                anew = member.anew(stand.own, taken, stands=stands) if befalls.restarts else None
+                anew = member.anew(stand.own, taken, stands=stands, zero=zero) if befalls.restarts else None
                 if not due:
                     yield Stand(stand.own, stand.taken, stand.begins, kept), True
                     if anew is not None:
@@ -455,7 +464,7 @@ class Runs:
             return now
         at, place = self.base
         base = int(now.levels[at].own[place])
-        every = {int(value) for value in self._every_number(now)}
+        every = {now.zero, *(int(value) for value in self._every_number(now))}
         older = sorted(every - {base}, key=lambda number: (base - number) % NUMBERS)
         known = {number: -label % NUMBERS for label, number in enumerate([base, *older])}
 
@@ -472,7 +481,7 @@ class Runs:
             tuple(known_as(held, self._numbers(source)) for held in kept)
             for source, kept in zip(self.remembered, now.past, strict=True)
         )
-        return Now(now.at, levels, now.given, past)
+        return Now(now.at, levels, now.given, past, known[now.zero])
 
     def _every_number(self, now: Now) -> Iterator[Value]:
         for member, stand in zip(self.members, now.levels, strict=True):
