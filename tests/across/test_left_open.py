@@ -148,7 +148,7 @@ def test_prove_tells_what_trusts_a_schedule_and_strict_counts_it(
 
 # --- drawn systems -----------------------------------------------------------------------------
 
-FEW, MOST = 2, 60
+FEW, MOST = 2, 64
 
 
 def _with_properties(made: Drawn, seed: int) -> Drawn:
