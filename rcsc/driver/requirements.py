@@ -143,7 +143,7 @@ def of_answer(
         found.timing.value if found.proved else "",
         found.levels,
         tuple(trusts_of(found, closed)),
-        0 if found.proved else found.broken_in_tick,
+        0 if found.proved else len(found.run),
     )
 
 

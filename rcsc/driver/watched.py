@@ -32,7 +32,7 @@ from rcsc.compose.proof.candidates import content
 from rcsc.compose.proof.context import lines_write
 from rcsc.compose.proof.level import LevelProof
 from rcsc.compose.proof.system import SystemProof, read_systems
-from rcsc.compose.together.kept import answered, recalled
+from rcsc.compose.together.kept import answered
 from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.product import Timing
 from rcsc.compose.together.proof import NO_RESTART, questions
@@ -82,7 +82,7 @@ def _across(
     if stated is None:
         return
     for question in questions(systems, system, stated[0], proof):
-        found = (None if cache is None else recalled(question, cache)) or answered(question, cache)
+        found = answered(question, cache)
         closed = found.closed(systems, proof.closed)
         if not closed.proved:
             continue

@@ -625,9 +625,21 @@ def test_a_proof_is_kept_and_a_changed_requirement_is_asked_anew(tmp_path: Path,
         assert status == 0
         assert "never_both" in out
     (tmp_path / "all.rcs").write_text(_BOTH.replace("always not", "always"))
-    status, out, _ = rcsc("prove", path)
+    status, out, err = rcsc("prove", path)
     assert status == 1
     assert "refuted in tick 1" in out
+    assert rcsc("prove", path)[2] == err
+
+
+def test_a_run_that_breaks_what_is_proved_of_kinder_surroundings_is_shown_again(
+    tmp_path: Path, rcsc: Rcsc
+) -> None:
+    soon = "requirement soon : whenever boss.go_left for 3 cycles, at once left.runs\n"
+    path = _written(tmp_path, soon)
+    _late(tmp_path, soon, 3)
+    first = rcsc("prove", path)
+    assert "is proved of kinder surroundings only: this run breaks it" in first[2]
+    assert rcsc("prove", path)[2] == first[2]
 
 
 def test_what_rests_on_a_level_that_is_not_proved_says_so(tmp_path: Path, rcsc: Rcsc) -> None:

@@ -5,28 +5,27 @@ from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 from unittest.mock import patch
 
 import pytest
 
 from rcsc.base.host.cache import Cache
 from rcsc.compose.contract.claims import RUNS, Closed, Verdict
+from rcsc.compose.counterexample.cycle_run import CycleRun, StageRun
 from rcsc.compose.exact.eventual import Waits
 from rcsc.compose.proof.level import NotConfirmedError
 from rcsc.compose.together.eventually import ANSWERS, COMES_TO_AN_END, bounds, waits_for
 from rcsc.compose.together.kept import answered, recalled
 from rcsc.compose.together.product import EVERY, LATE, Surroundings, Timing
 from rcsc.compose.together.proof import NEVER_LATE, NO_RESTART, Across, Question
+from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Int
 from rcsc.proof.solvers.sat import GaveUpError
 from rcsc.proof.symbolic import values
 from rcsc.run.description import Wire
 from tests.across.judge.drawn import Drawn, drawn, written
 from tests.across.judge.held import System
-
-if TYPE_CHECKING:
-    from rcsc.compose.counterexample.cycle_run import CycleRun
 
 _LEVEL = """\
 input x : bool
@@ -116,8 +115,6 @@ def test_it_rests_on_what_each_level_does_and_lacks_what_is_not_accepted(questio
 
 def test_a_run_breaks_it_in_its_last_tick_and_refutes_it_where_it_is_not_proved(question: Question) -> None:
     run: tuple[dict[str, CycleRun], ...] = ({}, {}, {})
-    assert _proved(question, run=run).broken_in_tick == 3
-    assert _proved(question, ticks=4).broken_in_tick == 4
     assert not _proved(question, run=run).refuted
     assert _proved(question, run=run, proved=False).refuted
     assert not _proved(question, proved=False).refuted
@@ -165,11 +162,19 @@ class _Answering:
         return self.found
 
 
+_TICK = {
+    "b": CycleRun(
+        {"x": 1, "y": True, "z": 0.5}, "of_b", "", Fault.ADMIT, ("calm",), {"m": False}, {"m": True}, ("r0",),
+        (("far", (1.0, 2)),), (StageRun("before", "r1"),), True, {"count": 1}, {"count": 2},
+    )
+}  # fmt: skip
+
+
 def _full(question: Question, **rest: object) -> Across:
     """Return an answer of which nothing is as it is by default."""
     return _proved(
         question, levels=("b",), by="somehow", around=EVERY[3], run_late=({"b.x": 1},), looked=5, vacuous=True,
-        assumed=("calm",), lasso=2, fair=("it comes",), stuck=True, ticks=7, **rest,
+        assumed=("calm",), lasso=2, fair=("it comes",), stuck=True, run=(_TICK,), broken_in=EVERY[1], **rest,
     )  # fmt: skip
 
 
@@ -180,20 +185,16 @@ def test_a_proof_is_kept_with_all_that_is_said_of_it(question: Question, tmp_pat
     assert answered(cast(Question, asked), cache) == asked.found
     kept = answered(cast(Question, asked), cache)
     assert asked.asked == 1
-    assert kept == replace(asked.found, ticks=0)  # no run is kept, but its length
+    assert kept == asked.found
+    assert kept.run[0]["b"].fault is Fault.ADMIT
 
 
-def test_what_is_not_proved_is_asked_again_and_its_verdict_is_known(
-    question: Question, tmp_path: Path
-) -> None:
+def test_what_is_not_proved_is_kept_with_its_run(question: Question, tmp_path: Path) -> None:
     cache = Cache(tmp_path / "kept", b"secret", "tool")
-    asked = _Answering(question, _full(question, proved=False, run=({}, {})))
-    for times in (1, 2):
-        answered(cast(Question, asked), cache)
-        assert asked.asked == times
-    known = recalled(question, cache)
-    assert known is not None
-    assert (known.proved, known.refuted, known.broken_in_tick, known.run) == (False, True, 2, ())
+    asked = _Answering(question, replace(_full(question), proved=False))
+    for _ in range(2):
+        assert answered(cast(Question, asked), cache) == asked.found
+    assert asked.asked == 1
     assert answered(cast(Question, asked), None) == asked.found
 
 

@@ -1,8 +1,8 @@
 """Verdicts on requirements across levels that an earlier run found.
 
 The key is all that a verdict depends on: the requirement, what is assumed beside it, every level that writes to those it names, directly or
-not, and how they are connected; and rcsc itself (`base.host.cache`). Of what is not proved the verdict is kept, and no run: it is looked
-for again where it is to be shown.
+not, and how they are connected; and rcsc itself (`base.host.cache`). A run that breaks the requirement is kept, too: the executors repeat
+it as they repeat a new one.
 """
 
 import hashlib
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rcsc.base.host.cache import Cache
+from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.proof.candidates import content
 from rcsc.compose.together.product import Surroundings, Timing
 from rcsc.compose.together.proof import Across, Question
@@ -29,22 +30,22 @@ class _Kept:
     timing: str
     levels: tuple[str, ...]
     by: str
-    refuses: bool
-    restarts: bool
+    around: Surroundings
     vacuous: bool
     assumed: tuple[str, ...]
     stuck: bool
     looked: int
-    ticks: int
+    run: tuple[dict[str, CycleRun], ...]
+    broken_in: Surroundings | None
     run_late: tuple[dict[str, int], ...]
     lasso: int
     fair: tuple[str, ...]
 
 
 def answered(question: Question, cache: Cache | None) -> Across:
-    """Return the answer to a question: an earlier one, if nothing has changed and it was a proof."""
+    """Return the answer to a question: an earlier one, if nothing has changed."""
     kept = None if cache is None else recalled(question, cache)
-    if kept is not None and kept.proved:
+    if kept is not None:
         return kept
     cut_before = smt.cut_short()
     found = question.answer()
@@ -54,7 +55,7 @@ def answered(question: Question, cache: Cache | None) -> Across:
 
 
 def recalled(question: Question, cache: Cache) -> Across | None:
-    """Return the verdict of an earlier run, without a run that breaks the requirement; None where nobody asked."""
+    """Return the answer that was kept; None where nobody asked."""
     kept = cache.load(_Kept, "across", _key(question))
     if kept is None:
         return None
@@ -64,8 +65,10 @@ def recalled(question: Question, cache: Cache) -> Across | None:
         Timing(kept.timing),
         kept.levels,
         kept.by,
-        Surroundings(kept.refuses, kept.restarts),
+        kept.around,
         question.system.late_ticks,
+        run=kept.run,
+        broken_in=kept.broken_in,
         run_late=kept.run_late,
         looked=kept.looked,
         vacuous=kept.vacuous,
@@ -73,24 +76,22 @@ def recalled(question: Question, cache: Cache) -> Across | None:
         lasso=kept.lasso,
         fair=kept.fair,
         stuck=kept.stuck,
-        ticks=kept.ticks,
     )
 
 
 def _to_keep(found: Across) -> _Kept:
-    around = found.around
     return _Kept(
         found.proved,
         found.timing.value,
         found.levels,
         found.by,
-        around.refuses,
-        around.restarts,
+        found.around,
         found.vacuous,
         found.assumed,
         found.stuck,
         found.looked,
-        len(found.run),
+        tuple(map(dict, found.run)),
+        found.broken_in,
         tuple(map(dict, found.run_late)),
         found.lasso,
         found.fair,

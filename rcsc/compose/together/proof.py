@@ -95,7 +95,6 @@ class Across:
         lasso: The tick of the run, from 1, from which on it waits as at its end, again and again; 0 where the last one breaks it.
         fair: What is trusted to come at some time, where something is proved to.
         stuck: Whether it is open because what is assumed across levels was not shown to be kept for ever.
-        ticks: Of a run that breaks it, where the run itself was not kept.
     """
 
     stated: Property
@@ -114,17 +113,11 @@ class Across:
     lasso: int = 0
     fair: tuple[str, ...] = ()
     stuck: bool = False
-    ticks: int = 0
-
-    @property
-    def broken_in_tick(self) -> int:
-        """The last tick of the run that breaks it; 0 where none is known."""
-        return len(self.run) or self.ticks
 
     @property
     def refuted(self) -> bool:
         """Whether a run of the system breaks it, in the surroundings in which it is not proved."""
-        return self.broken_in_tick > 0 and not self.proved
+        return bool(self.run) and not self.proved
 
     def trusts(self, systems: Mapping[str, TransitionSystem]) -> tuple[str, ...]:
         """Return what is trusted of the surroundings of its levels, besides what these rest on."""

@@ -26,7 +26,7 @@ def said(found: Across, closed: Closed, claims: Collection[Need]) -> str:
             return f"refuted, as scheduled, by a run of {levels} on which it waits for ever"
         if found.refuted:
             how = "with late buffers" if any(found.run_late) else "as scheduled"
-            return f"refuted in tick {found.broken_in_tick}, {how}, by a run of {levels}"
+            return f"refuted in tick {len(found.run)}, {how}, by a run of {levels}"
         if found.stuck:
             return "not proved: what is assumed across levels was not shown to be kept for ever"
         return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"

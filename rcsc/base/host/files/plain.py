@@ -1,13 +1,13 @@
 """Values kept as plain ones, which JSON keeps exactly, and read back by their declared types.
 
-In: dataclasses whose fields are plain values, words of a `StrEnum`, literals, tuples, lists, dictionaries by text, and dataclasses of
-these. Out: the same after `plain` and `read`; what no such value was written as is refused.
+In: dataclasses whose fields are plain values, words of a `StrEnum`, numbers of an `IntEnum`, literals, tuples, lists, dictionaries by
+text, and dataclasses of these. Out: the same after `plain` and `read`; what no such value was written as is refused.
 """
 
 import types
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from functools import cache
 from math import isfinite
 from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
@@ -70,6 +70,8 @@ def read(kind: Any, value: Any) -> Any:
         return {key: read(args[1], item) for key, item in value.items()}
     if isinstance(kind, type) and issubclass(kind, StrEnum):
         return kind(_text(value))
+    if isinstance(kind, type) and issubclass(kind, IntEnum):
+        return kind(_bounded(value))
     if type(value) is kind or (kind is float and type(value) is int):
         return _bounded(value)
     raise ValueError(f"{_shown(value)} is no {getattr(kind, '__name__', kind)}")
