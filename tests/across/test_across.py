@@ -606,6 +606,24 @@ def test_prove_tells_requirements_first_with_timing_levels_and_runs(tmp_path: Pa
     assert len({row["tick"] for row in every["soon"]["time_line"]}) == 5
 
 
+def test_one_requirement_alone_is_answered_and_counted(tmp_path: Path, rcsc: Rcsc) -> None:
+    wrong = "requirement soon : when boss.go_left, within 1 cycles, right.runs\n"
+    path = _written(tmp_path, _BOTH + wrong)
+    status, out, err = rcsc("prove", path, "--requirement", "never_both")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[1].split()[:2] == ["never_both", "proved"]
+    assert "1 requirement across levels" in out
+    assert "soon" not in out
+    assert rcsc("prove", path)[0] == 1
+    assert rcsc("prove", path, "--requirement", "soon")[0] == 1
+    status, _, err = rcsc("prove", path, "--requirement", "son")
+    assert status == 2
+    assert "there is no requirement across levels `son`; there are never_both, soon" in err
+    assert rcsc("prove", path, "--requirement", "soon", "--level", "boss")[0] == 2
+    (tmp_path / "all.rcs").write_text("")
+    assert "the system states none" in rcsc("prove", path, "--requirement", "soon")[2]
+
+
 def test_show_prints_a_run_of_all_levels_that_asks(tmp_path: Path, rcsc: Rcsc) -> None:
     asks = "requirement obeys : when boss.go_left, within 1 cycles, left.runs or not boss.go_left\n"
     never = "requirement idle : when boss.go_left and boss.go_right, within 1 cycles, left.runs\n"

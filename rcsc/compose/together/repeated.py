@@ -4,7 +4,7 @@ In: a system with the proofs of its levels. Out: `Answers`. A run is an `Explana
 keeps runs serves this one, too.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.base.host.cache import Cache
@@ -89,8 +89,9 @@ def answers(
     whole: SystemProof,
     settings: TraceSettings,
     cache: Cache | None,
+    only: Collection[str] = (),
 ) -> Answers | None:
-    """Answer the requirements across levels; None where the system states none.
+    """Answer the requirements across levels, or only those of these names; None where the system states none.
 
     Raises:
         NoProgramError: Their file is not in order.
@@ -100,6 +101,8 @@ def answers(
     if stated is None:
         return None
     program, loaded = stated
+    if only:
+        program = replace(program, properties=tuple(one for one in program.properties if one.name in only))
     every = []
     for question in questions(systems, settings.system, program, whole):
         found = answered(question, cache)

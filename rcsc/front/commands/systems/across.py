@@ -1,6 +1,6 @@
 """What `rcsc prove` says of requirements across levels: first of all, for they are what the levels are for."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.systems.explained import say_exercise, say_run
 from rcsc.lang.model import Property
 from rcsc.lang.over_time.past import TRUE
+from rcsc.run.description import Description
 
 if TYPE_CHECKING:
     from rcsc.views.pages.requirement_page import RequirementStory
@@ -65,6 +66,18 @@ def counts(
     }
     told = (f"{counted(many, 'requirement')} across levels {what}" for what, many in lacks.items() if many)
     return len(every), len(every) - len(proved), tuple(told)
+
+
+def check_names(names: Collection[str], systems: Mapping[str, TransitionSystem], system: Description) -> None:
+    """Raise `click.UsageError` where the system states no requirement across levels of one of these names."""
+    if not names:
+        return
+    stated = stated_across(system, {level: ts.program for level, ts in systems.items()})
+    known = [] if stated is None else [one.name for one in stated[0].properties]
+    for name in names:
+        if name not in known:
+            there = f"there are {', '.join(known)}" if known else "the system states none"
+            raise click.UsageError(f"there is no requirement across levels `{name}`; {there}")
 
 
 def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:

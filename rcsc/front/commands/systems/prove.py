@@ -33,6 +33,8 @@ Examples:
 )
 @click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
+@click.option("--requirement", "required", multiple=True, metavar="NAME",
+              help="Of the requirements across levels, answer only this one (repeatable).")  # fmt: skip
 @steps_option(80, " All questions about one level get 50 times as many together.")
 @click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="as many as processors, or 1 for small levels",
               help="Levels proved at once.")  # fmt: skip
@@ -77,7 +79,7 @@ Examples:
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int | None,
+    system: Path | None, only: tuple[str, ...], required: tuple[str, ...], steps: int, jobs: int | None, cycles: int | None,
     further: int, begins: tuple[str, ...], logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, exports: tuple[str, Path] | None, shows: tuple[str, ...],
@@ -93,6 +95,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         need(extra)
     if report is not None and len(shows) != 1:
         raise click.UsageError("--report is of one requirement: `--show NAME` says which")
+    if only and required:
+        raise click.UsageError("--level proves levels alone, --requirement is about what several do together")
     path = None if cases else system_path(system)
     rules = {
         "without-deferral": without_deferral,
@@ -104,7 +108,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         None if no_cache or variants or path is None else open_cache(path.parent)
     )  # a variant is nobody's tables
     key = tuple(
-        map(str, (os.getcwd(), path, only, steps, cycles, further, begins, strict, invariants, as_json))
+        map(
+            str,
+            (os.getcwd(), path, only, required, steps, cycles, further, begins, strict, invariants, as_json),
+        )
     )
     if (
         cache is not None
@@ -134,7 +141,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if shows:
         return shown_by_runs(path, shows, cycles)
     asked = Asked(
-        only, steps, jobs, cycles, further, begins, logs, freeze, variants, certificate, confirms, progress, strict, invariants,
+        only, required, steps, jobs, cycles, further, begins, logs, freeze, variants, certificate, confirms, progress, strict, invariants,
         as_json, coverage,
     )  # fmt: skip
     return proved(path, asked, cache, key)

@@ -89,6 +89,7 @@ class Asked:
     """
 
     only: tuple[str, ...]
+    required: tuple[str, ...]
     steps: int
     jobs: int | None
     cycles: int | None
@@ -127,6 +128,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     )
     for name in asked.variants:
         systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
+    across.check_names(asked.required, systems, settings.system)
     effort = Effort(limits=Limits.of(asked.steps))
     large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
     with _LevelProgress(names, wanted=asked.progress) as done:
@@ -191,7 +193,7 @@ def _across(
 ) -> Answers | None:
     """Answer the requirements across levels; none where the system states none."""
     try:
-        return answers(systems, proof, settings, cache)
+        return answers(systems, proof, settings, cache, asked.required)
     except OSError as error:
         place = str(error.filename or asked.logs)
         raise UnwritableError(place, error.strerror or "no reason given") from error
