@@ -102,6 +102,43 @@ def test_what_was_proved_together_is_told_with_what_to_write(
     assert run(["check", "machine.rcs"]) == 0
 
 
+COUNTS_AND_LOOKS_BACK = """\
+input go : bool
+state left : int 0 .. 100
+output quick : bool
+property quick_counts : quick implies left > 0
+property rises : was left <= left or left = 0
+table count {
+  | line  | go    | left  || left     | quick |
+  |-------|-------|-------||----------|-------|
+  | first | true  | 0     || 1        | true  |
+  | more  | true  | 1..99 || left + 1 | true  |
+  | full  | true  | 100   ||          | true  |
+  | off   | false |       || 0        | false |
+}
+level machine { period 10 [ms] table count }
+"""
+
+
+def test_the_invariant_that_is_printed_is_in_the_language_and_speaks_of_what_is_declared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "machine.rcs").write_text(COUNTS_AND_LOOKS_BACK, encoding="utf-8")
+    head = 'name = "s"\ngenerated = "generated"\ntick_ms = 10\n[[level]]\nname = "machine"\n'
+    (tmp_path / "system.toml").write_text(
+        f'{head}[buffers]\n"a.go" = "machine.go"\n"machine.quick" = "a.quick"\n', encoding="utf-8"
+    )
+    assert prove("--invariants") == 0
+    out = capfd.readouterr().out
+    [said] = [line for line in out.splitlines() if line.startswith("  invariant of_machine : ")]
+    assert "left = 0" in said or "left > 0" in said
+    assert "(>" not in out
+    assert "was_" not in said
+    (tmp_path / "machine.rcs").write_text(f"{COUNTS_AND_LOOKS_BACK}{said.strip()}\n", encoding="utf-8")
+    assert run(["check", "machine.rcs"]) == 0
+
+
 def reported_table(form: str, name: str = "work") -> dict[str, Any]:
     found: dict[str, Any] = next(one for one in json.loads(form)["tables"] if one["table"] == name)
     return found

@@ -15,6 +15,7 @@ a state; all of it is read from the model:
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from rcsc.code.testing.inputs.condition_text import words
 from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import call, holds
 from rcsc.lang.leaves import everything, expressions, parts, read_by, renamed
@@ -76,6 +77,12 @@ class Predicate:
         if self.module is not None:
             return f"({self.leaf} is as `{self.module.name}` computes it)"
         return f"({self.leaf} = {self.other})" if self.other else self.leaf
+
+    def says(self, value: int) -> str:
+        """Return in the language's words that it has a value."""
+        if self.condition is None:
+            return f"{self.name} = {self.shown(value)}"
+        return f"{words(self.condition)}" if value else f"not ({words(self.condition)})"
 
     def of(self, leaves: Container[str]) -> bool:
         """Return whether it speaks of these leaves alone, in words that the language has."""

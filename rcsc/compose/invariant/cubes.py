@@ -43,7 +43,7 @@ def _joined(chosen: Sequence[Predicate], clause: Cube, none_of: str) -> str:
 def _spelled(predicate: Predicate, values: Sequence[int], none_of: str) -> str:
     """Spell one predicate's value, or the values that it has not."""
     if values[0] >= 0:
-        return f"{predicate.name} = {predicate.shown(values[0])}"
+        return predicate.says(values[0])
     others = [predicate.shown(~value) for value in reversed(values)]
     return (
         f"{predicate.name} /= {others[0]}"

@@ -302,7 +302,7 @@ class PDR:
             allowed |= self.reached.values(others, at)
             if 2 * len(allowed) > self.step.sizes[at]:
                 return None
-            wide = tuple(sorted((*others, *((at, ~value) for value in allowed))))
+            wide = tuple(sorted({*others, *((at, ~value) for value in allowed)}))
             kept = self._not_first(wide)
             if kept is None:
                 continue

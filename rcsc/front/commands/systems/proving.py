@@ -471,14 +471,16 @@ def _invariants(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> 
         for clause in level.clauses:
             yield f"  {shown(level.predicates, clause)}"
         program = systems[level.level].program
+        hidden = {v.name for v in program.variables if v.previous_of is not None or v.counts is not None}
         own = {
             str(leaf)
             for declared in program.declared
             if declared.kind is not Kind.INPUT
             for leaf in declared.leaves
+            if leaf not in hidden
         }
         if condition := as_condition(level.predicates, level.clauses, own):
-            yield "the part about its own values, as a declaration for its program:"
+            yield "the part about its own values, as a declaration; `rcsc check` says whether it stands without its environment:"
             yield f"  invariant of_{level.level} : {condition}"
 
 
