@@ -6,7 +6,7 @@ Printed: seconds and questions to the solvers, of a level and of the system, wha
 Levels are proved one by one: the questions of a system are the sum of its levels' (`tests/compose/test_hierarchies.py`).
 
 `--across N...`: requirements across chains of so many levels of three tables each. A PAUSE of the highest reaches the lowest after a tick a
-level; and one that the lowest two keep, whatever stands above them.
+level; and one that the lowest two keep, whatever stands above them. Processor time is drawn: where it doubles, a bar is longer by `BAR`.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import log2
 from pathlib import Path
 from unittest.mock import patch
 
@@ -37,6 +38,7 @@ WIDER = tuple((tables, 3) for tables in (10, 20, 40, 60))
 """More and more tables in the upper one of two levels."""
 BROADER = tuple((tables, tables) for tables in (10, 20, 40, 60))
 """In both: with the commands of the upper level those that it orders."""
+BAR = 6
 
 
 @dataclass
@@ -167,7 +169,10 @@ def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
 
 
 def across(levels: int) -> Iterator[tuple[str, Across, float]]:
-    """Answer two requirements of a chain: one from end to end, one of the lowest two levels; yield each with its processor time."""
+    """Answer two requirements of a chain: one from end to end, one of the lowest two levels; yield each with its processor time.
+
+    The levels are proved before, as `rcsc prove` does, and that is not counted.
+    """
     with tempfile.TemporaryDirectory(prefix="rcsc-growth-") as folder:
         path = written(chain((3,) * levels), Path(folder))
         path.write_text('requirements = "all.rcs"\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
@@ -182,9 +187,10 @@ def across(levels: int) -> Iterator[tuple[str, Across, float]]:
         known, system = transition_systems(path), description(path)
         stated = stated_across(system, {name: ts.program for name, ts in known.items()})
         assert stated is not None
+        proofs = {name: prove_level(ts) for name, ts in known.items()}
         for one in stated[0].properties:
             begun = time.process_time()
-            found = Question(known, system, stated[0], one).verdict()
+            found = Question(known, system, stated[0], one, proofs).verdict()
             yield one.name, found, time.process_time() - begun
 
 
@@ -201,8 +207,9 @@ def main(arguments: list[str] | None = None) -> int:
     for levels in given.across:
         for name, found, seconds in across(levels):
             verdict = "proved" if found.proved else "open"
+            drawn = "#" * round(BAR * log2(1 + seconds))
             print(
-                f"{levels:>6} levels  {name:12} {verdict} of {len(found.levels):>2}  {seconds:>6.1f} s",
+                f"{levels:>6} levels  {name:12} {verdict} of {len(found.levels):>2}  {seconds:>6.1f} s {drawn}",
                 flush=True,
             )
     if given.across:
