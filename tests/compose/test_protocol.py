@@ -384,7 +384,7 @@ def test_check_repeats_no_property_that_nobody_wrote_until_one_is_not_proved(
 def test_a_level_of_two_subordinates_keeps_its_decision_until_both_have_echoed(
     keeps: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The manual's example; without its column `answered` a decision may turn where a report is refused: then one echo is late and one not."""
+    """The manual's example; without its column `answered` a decision may turn where a report is refused, and one echo is late alone."""
     manual = (Path(__file__).parents[2] / "grammar" / "manual.md").read_text(encoding="utf-8")
     [text] = [
         case
