@@ -74,6 +74,7 @@ def test_a_run_tells_the_tick_that_breaks_a_requirement_and_replay_finds_it_in_b
     assert re.findall(r"cycle (\d+): requirement `(\w+)` across levels is broken: (.*)", text) == [
         ("4", "held", "`left.runs` = true, `boss.wish` = nobody")
     ]
+    assert "watched: 1 requirement, 1 broken" in text
     log = tmp_path / ".rcsc-cache" / "two.mcap"
     for executor in ("c", "python"):
         assert rcsc("run", path, "--cycles", "30", "--executor", executor, "-q")[0] == 1
@@ -89,6 +90,7 @@ def test_what_is_not_monitored_or_is_kept_is_not_told(tmp_path: Path, rcsc: Rcsc
     path = _with_plant(_written(tmp_path, held + _OBEYS.replace("obeys", "obeys monitored")), "nobody", "l")
     status, text = _ran(rcsc, path)
     assert (status, "across levels" in text) == (0, False)
+    assert "watched: 1 requirement, none broken" in text
 
 
 def test_what_a_party_gives_is_what_the_levels_of_that_tick_take(tmp_path: Path, rcsc: Rcsc) -> None:
@@ -110,6 +112,7 @@ def test_a_plant_that_breaks_what_is_assumed_is_told_as_that_with_the_tick(
         "cycle 4: assumption `calm` across levels is broken by what stands outside: `panel.wish` = r" in text
     )
     assert "what is proved trusting it says nothing of this cycle, nor of any later one" in text
+    assert re.search(r"watched: .*1 assumption, 1 broken", text)
     log = tmp_path / ".rcsc-cache" / "two.mcap"
     status, out, _ = rcsc("replay", log, "--system", path, "--executor", "python", "--find", "not calm")
     assert out.startswith("cycle 4,")

@@ -4,6 +4,7 @@ import contextlib
 import shlex
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files.read import content, json_of
 from rcsc.base.host.trust import Agreement
+from rcsc.code.testing.figures import counted
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped, attach, say_error
@@ -213,7 +215,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
             raise _interrupted(run, log) from error
     if asked.report is not None:
         _write_report(asked.report, witness, log, asked, seconds)
-    broken = _watched(wanted, log)
+    broken = _watched(wanted, log, quiet=asked.quiet)
     return _closing(witness, stage.resume, asked, seconds, log) or int(broken)
 
 
@@ -224,12 +226,15 @@ def _wanted(asked: RunOptions) -> dict[str, "tuple[Property, ...]"]:
     return requirements(asked.path, description(asked.path), monitored=True)
 
 
-def _watched(wanted: Mapping[str, "tuple[Property, ...]"], log: Path, *, free: bool = False) -> bool:
-    """Say the first cycle that breaks each requirement, or assumption, that every run watches; return whether there is one.
+def _watched(
+    wanted: Mapping[str, "tuple[Property, ...]"], log: Path, *, quiet: bool, free: bool = False
+) -> bool:
+    """Say how many requirements and assumptions were watched, and of each the first cycle that breaks it; return whether there is one.
 
     Args:
         wanted: What is watched.
         log: Of the run.
+        quiet: Whether nothing is said of what is kept.
         free: Whether levels ran when they liked.
     """
     from rcsc.run.log.read import read
@@ -249,6 +254,12 @@ def _watched(wanted: Mapping[str, "tuple[Property, ...]"], log: Path, *, free: b
                 "each level ran when it liked: what is proved under any timing holds of this run, what is proved as scheduled need not",
             )
         attach("help", f'rcsc replay {shlex.quote(str(log))} --find "not {one.asked}"')
+    every = Counter(
+        "assumption" if one.assumed else "requirement" for stated in wanted.values() for one in stated
+    )
+    if every and not quiet:
+        what = " and ".join(counted(many, kind) for kind, many in sorted(every.items(), reverse=True))
+        click.echo(f"watched: {what}, {len(first) or 'none'} broken")
     return bool(first)
 
 
@@ -385,7 +396,7 @@ def _apart(asked: RunOptions, from_row: int | None) -> int:
         course = Course(asked.in_step, log, asked.most, asked.path, faults, asked.order.faults)
         ends = _rows_apart(asked, system, course, (from_row or 1) - 1, folder / "results")
     _recorded_apart(asked, system, ends, log, time.perf_counter() - begun)
-    broken = _watched(wanted, log, free=not asked.in_step)
+    broken = _watched(wanted, log, quiet=asked.quiet, free=not asked.in_step)
     if ends and ends[-1][2] != "done":
         number, text, state, reason, _ = ends[-1]
         raise Stopped(
