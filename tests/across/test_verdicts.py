@@ -195,6 +195,14 @@ def test_what_is_not_proved_is_kept_with_its_run(question: Question, tmp_path: P
     for _ in range(2):
         assert answered(cast(Question, asked), cache) == asked.found
     assert asked.asked == 1
+
+
+def test_what_is_open_is_asked_again(question: Question, tmp_path: Path) -> None:
+    cache = Cache(tmp_path / "kept", b"secret", "tool")
+    asked = _Answering(question, replace(_full(question), proved=False, run=(), broken_in=None))
+    for times in (1, 2):
+        assert answered(cast(Question, asked), cache) == asked.found
+        assert asked.asked == times
     assert answered(cast(Question, asked), None) == asked.found
 
 

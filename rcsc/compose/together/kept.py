@@ -43,9 +43,9 @@ class _Kept:
 
 
 def answered(question: Question, cache: Cache | None) -> Across:
-    """Return the answer to a question: an earlier one, if nothing has changed."""
+    """Return the answer to a question: an earlier one, if nothing has changed, and it was not open: of levels more may be proved since."""
     kept = None if cache is None else recalled(question, cache)
-    if kept is not None:
+    if kept is not None and (kept.proved or kept.run):
         return kept
     cut_before = smt.cut_short()
     found = question.answer()
