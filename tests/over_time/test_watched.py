@@ -87,6 +87,10 @@ def test_a_run_that_keeps_what_is_watched_is_no_finding(
     kept = DOOR.replace("within 1 cycles, given", "within 2 cycles, given")
     (system / "door.rcs").write_text(kept, encoding="utf-8")
     assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python"]) == 0
+    text = said(capsys)
+    assert "watched: 1 requirement, none broken" in text
+    assert "requirement `" not in text
+    assert rcsc(["run", str(system), "--cycles", "20", "--executor", "python", "--quiet"]) == 0
     assert "requirement" not in said(capsys)
 
 
