@@ -13,10 +13,13 @@ import pytest
 
 from rcsc.base.host.cache import FOLDER, Cache
 from rcsc.base.host.files.plain import plain, read
+from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.invariant.cubes import as_condition
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict, SystemOutline, standing
 from rcsc.driver import outline
 from rcsc.front.commands import run
 from rcsc.lang.interpret import initial, run_table
+from rcsc.lang.model import Apply, Bool, Op, Read, VariableName
 from tests.support.programs.stages import program_of
 from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
 from tests.support.programs.texts import edit_file, level, table
@@ -602,3 +605,12 @@ def test_a_fact_about_change_is_believed_from_one_cycle_to_the_next(
     jump = {**initial(program), "x": 3}
     assert run_table(program, program.tables[0], jump).failed_assumptions == ("slow",)
     assert run_table(program, program.tables[0], {**jump, "x": 2}).failed_assumptions == ()
+
+
+def test_a_condition_of_two_parts_stays_one_beside_others_in_what_is_printed() -> None:
+    """`a or b` beside `c` is not `a or b and c`."""
+    read = {name: Read(VariableName(name), Bool()) for name in "abc"}
+    either = Predicate("a or b", Bool(), condition=Apply(Op.OR, (read["a"], read["b"]), Bool()))
+    chosen, nameable = (either, Predicate("c", Bool())), frozenset("abc")
+    assert as_condition(chosen, [((0, 1), (1, 1))], nameable) == "not ((a or b) and c = true)"
+    assert as_condition(chosen, [((0, 0), (1, 1))], nameable) == "not (not (a or b) and c = true)"

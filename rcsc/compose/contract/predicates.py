@@ -82,7 +82,7 @@ class Predicate:
         """Return in the language's words that it has a value."""
         if self.condition is None:
             return f"{self.name} = {self.shown(value)}"
-        return f"{words(self.condition)}" if value else f"not ({words(self.condition)})"
+        return f"{'' if value else 'not '}({words(self.condition)})"
 
     def of(self, leaves: Container[str]) -> bool:
         """Return whether it speaks of these leaves alone, in words that the language has."""

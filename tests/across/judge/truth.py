@@ -429,9 +429,9 @@ class Runs:
         befalls = self.befalls
         ages = stand.ages or (0,) * len(contents)
         free = [values_of(member.ts.kinds[leaf]) for leaf in member.free]
+        first = member.empty(zero)
         for by in product(*(range(min(befalls.late, age + 1) + 1) for age in ages)):
             kept = by if befalls.late > 1 else ()
-            first = member.empty(zero)
             taken = {leaf: first[leaf] for leaf in member.inputs}
             for end, age, held in zip(member.ends, by, contents, strict=True):
                 if (found := held[age]) is not None:
