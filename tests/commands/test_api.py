@@ -189,8 +189,12 @@ def test_nothing_runs_that_is_not_proved(dock: Path) -> None:
     edit_file(
         dock / "drive.rcs",
         (
-            "  | bad   | false       | bad    |        |                      |        ||                  | 0          | fail       |\n",
-            "",
+            (
+                "  | bad   | false       | bad    |        |                      |        |"
+                "|                  | 0          | fail       |\n"
+                "}\n\n## Creeps"
+            ),
+            "}\n\n## Creeps",
         ),
     )
     with pytest.raises(rcsc.CodedError, match="no line of table `goto` matches"):

@@ -19,8 +19,8 @@ from rcsc.run.plant.bind import BadPlant
 
 HALL = '''
     def stays_in_the_hall(self) -> Property:
-        """There is a wall at one metre."""
-        return self.travelled < 1.0
+        """There is a wall at half a metre."""
+        return self.travelled < 0.5
 '''
 WILD = """
 import os
@@ -62,7 +62,7 @@ def rcsc(*args: object) -> int:
 
 @pytest.fixture
 def hall(dock: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of a dock whose plant has a property that backing out breaks; commands run beside it."""
+    """The folder of a dock whose plant has a property that docking breaks; commands run beside it."""
     base = dock / "base.py"
     text = base.read_text(encoding="utf-8").replace("import Fault, Range", "import Fault, Property, Range")
     base.write_text(text + HALL, encoding="utf-8")
@@ -93,12 +93,12 @@ def test_a_campaign_finds_shrinks_saves_and_shows_again_what_a_plant_says_must_n
     }
     facts = json.loads((place / "finding.json").read_text())
     assert facts["property"] == "plant: stays_in_the_hall"
-    assert "base.travelled = 1.0" in facts["said"]
+    assert "base.travelled = 0.512" in facts["said"]
     [happens] = facts["happens"]
-    assert happens.startswith("`supervisor` is ordered `undock`")
+    assert happens.startswith("`supervisor` is ordered `dock`")
     assert f"\n  = note: {happens}\n" in said.err
     assert saved_episode(place, Rig(ANY, hall / "system.toml")) == Episode(
-        orders=(OrderSpec("supervisor", "undock"),)
+        orders=(OrderSpec("supervisor", "dock"),)
     )
     shown = (
         f"error[RCS743]: {place}, cycle {facts['tick']}: `{facts['property']}` does not hold: {facts['said']}"

@@ -11,7 +11,7 @@ from rcsc.code.testing.boards import BOARDS
 from tests.support.programs.stages import STRICT
 
 GUIDE = Path(__file__).parents[2] / "tables/README.md"
-PRINTED = "status 0 at 628 mm\n"
+PRINTED = "status 0 at 640 mm\n"
 
 
 def shown(language: str) -> str:

@@ -6,12 +6,14 @@ from pathlib import Path
 import mujoco
 import pytest
 
+from rcsc import load_system
 from rcsc.front.commands import run
 from rcsc.run.description import BadDescription, description
 from rcsc.run.plant.bind import BadPlant, BoundPlant, Buffer, PlantFailed, plant_page
 from rcsc.run.plant.load import load
 from rcsc.run.plant.models.bindings import Binder, driven_in
 from rcsc.run.plant.models.model_plant import BoundModel
+from rcsc.run.plant.space import space_of
 from rcsc.run.plant.staged import Staged
 from rcsc.run.signature import Leaf, Values
 from rcsc.run.system import signatures
@@ -68,6 +70,59 @@ def test_the_robot_docks_by_contact(dock: Path, capsys: pytest.CaptureFixture[st
     film = film_of(page)
     assert "drive.travelled_mm" in film["shown"]
     assert film["variables"]["drive"]["travelled_mm"]["unit"] == "mm"
+
+
+TOUCHES_M, HELD_M = 0.635, 0.655
+"""Where the base touches the pin, and where the guides hold it, in both plants."""
+
+
+@pytest.mark.parametrize("plant", [None, "mujoco"])
+def test_the_robot_charges_by_contact_and_backs_out_of_it(dock: Path, plant: str | None) -> None:
+    """By what is outside, not by what is reported: where base and pin are after every tick. It docks twice."""
+    robot = load_system(dock / "system.toml", plant=plant, executor="python")
+    ways: list[float] = []
+    pins: list[float] = []
+    speeds: list[int] = []
+
+    def look(*_: object) -> None:
+        space = space_of(robot.system.outside)
+        assert space is not None
+        at = dict(zip(space.bodies, space.poses()[::7], strict=True))
+        ways.append(at["base"])
+        pins.append(at["pin"] - (TOUCHES_M + 0.11))
+        speeds.append(int(robot.value("drive.speed_mm_s")))
+
+    robot.system.watch.append(look)
+    for _ in range(2):
+        for command, charges in (("dock", True), ("undock", False)):
+            robot.order(command)
+            begun = len(ways)
+            robot.step(120)
+            report = robot.report()
+            assert report is not None
+            assert (report["ref_command_echo"], report["status_report"]) == (command, "done")
+            assert robot.value("supervisor.contact") is charges
+            assert (ways[-1] > TOUCHES_M) is charges
+            assert (pins[-1] > 0.001) is charges, "the pin springs back"
+            if not charges:
+                assert 0.05 < ways[-1] <= 0.1
+                assert max(speeds[begun + 1 :]) <= 0
+    assert max(ways) < HELD_M + 0.001, "nothing rolls through the charger"
+
+
+def test_the_python_base_touches_only_where_it_is_in_the_middle_and_presses(dock: Path) -> None:
+    """Wherever it is put."""
+    base = load_system(dock / "system.toml", executor="python").plant
+    seen = set()
+    for way in range(0, 700, 5):
+        for aside in range(-200, 201, 4):
+            base.travelled, base.lateral = way / 1000, aside / 1000
+            base.step(0.04)
+            middle, presses = abs(base.lateral) < 0.006, base.travelled > TOUCHES_M + 0.001
+            assert base.travelled <= HELD_M
+            assert base.contact is (middle and presses)
+            seen.add((middle, presses))
+    assert len(seen) == 4, "a case is not looked at"
 
 
 def test_controls_and_readings_are_converted(dock: Path) -> None:

@@ -206,7 +206,7 @@ def test_what_is_wrong_is_told_before_a_process_is_begun(
     (here / "base.py").write_text(edited(text, ("bumper: bool", "bumper: int")), encoding="utf-8")
     for more in ([], ["--processes"]):
         assert run(["run", "dock", "--no-compile", "-q", *more]) == 1
-        assert "error[RCS729]: `bumper` of `Base` (base.py:16) is `int`" in stopped(capsys)
+        assert "error[RCS729]: `bumper` of `Base` (base.py:49) is `int`" in stopped(capsys)
     system = (here / "system.toml").read_text(encoding="utf-8")
     (here / "system.toml").write_text(edited(system, ('script = "dock.csv"\n', "")), encoding="utf-8")
     (here / "base.py").write_text(text, encoding="utf-8")
@@ -258,7 +258,7 @@ def test_a_buffer_that_was_forgotten_is_named(here: Path, capsys: pytest.Capture
 def test_without_a_plant_nothing_moves_but_what_the_script_sets(here: Path) -> None:
     system = (here / "system.toml").read_text(encoding="utf-8")
     (here / "system.toml").write_text(edited(system, ('[plant]\npython = "base.py"\n', "")), encoding="utf-8")
-    text = "command,base.beacon,base.contact,base.travelled,base.lateral,cycles\ndock,true,false,600,100,5\n,,true,,0,6\n"
+    text = "command,base.beacon,base.contact,base.travelled,base.lateral,cycles\ndock,true,false,640,100,5\n,,true,640,0,6\n"
     run_ = scripted(here, text)
     assert [result.state for result in run_.steps(100)] == ["done", "done"]
     assert run_.system.level("supervisor").shown("report.status_report") == "done"
@@ -422,7 +422,7 @@ cycles = 4
 
 [[row]]
 command = "dock"
-cycles = 3
+cycles = 40
 
 [[row]]
 command = "undock"
@@ -431,8 +431,8 @@ within = 200
     assert played(here, text, end=".toml") == [
         ("done", "failed as expected: reason no_beacon", 3),
         ("done", "", 4),
-        ("done", "", 3),
-        ("done", "", 97),
+        ("done", "", 40),
+        ("done", "", 63),
     ]
 
 

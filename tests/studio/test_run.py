@@ -35,9 +35,10 @@ from tests.support.programs.examples import EXTERN
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edited
 
+REST = "|        |                      |        ||                  | 0          |"
 ROW = (
-    "  | idle  | false       | idle   |        |                      |        ||                  | 0          | done       |\n",
-    "",
+    f"  | idle  | false       | idle   {REST} done       |\n  | bad   | false       | bad    {REST} fail       |\n}}\n\n## Creeps",
+    f"  | bad   | false       | bad    {REST} fail       |\n}}\n\n## Creeps",
 )
 """What takes a line out of a table."""
 DOCK = Path(__file__).parents[1] / "data" / "dock"
@@ -703,8 +704,9 @@ def test_reload_proved_has_the_levels_proved_together_first(
     kept = f"level `drive` is proved together with its neighbours, as the files of {dock} stand"
 
     async def work(one: Page, other: Page) -> None:
-        await one.ask("run.type", line="order supervisor undock")
-        await one.ask("run.type", line="run 20")
+        await one.ask("run.type", line="run 2")  # the beacon is seen
+        await one.ask("run.type", line="order supervisor dock")
+        await one.ask("run.type", line="run 18")
         edit(OTHERWISE)
         proving = asyncio.create_task(told(one, "reload drive proved"))
         await until(lambda: one.progress)
@@ -750,8 +752,9 @@ def test_tables_are_not_taken_where_nobody_waits_for_it(
         return number
 
     async def work(one: Page, other: Page) -> None:
-        await one.ask("run.type", line="order supervisor undock")
-        await one.ask("run.type", line="run 20")
+        await one.ask("run.type", line="run 2")  # the beacon is seen
+        await one.ask("run.type", line="order supervisor dock")
+        await one.ask("run.type", line="run 18")
         edit(OTHERWISE)
         monkeypatch.setattr(Solver, "check", slow)
         for questions in (1, 40, 100):
@@ -816,7 +819,7 @@ def test_what_a_campaign_found_opens_as_a_run_that_says_what_it_breaks(
     shutil.copytree(dock_compiled, folder)
     base = folder / "base.py"
     text = base.read_text(encoding="utf-8").replace("import Fault, Range", "import Fault, Property, Range")
-    wall = "\n    def stays_in_the_hall(self) -> Property:\n        return self.travelled < 1.0\n"
+    wall = "\n    def stays_in_the_hall(self) -> Property:\n        return self.travelled < 0.5\n"
     base.write_text(text + wall, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert rcsc(["campaign", "dock", "--no-compile", "--workers", "1", "--episodes", "8"]) == 1
