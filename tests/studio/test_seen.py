@@ -93,6 +93,37 @@ def test_a_model_shows_every_shape_that_is_drawn(rover: Path) -> None:
     talk(Opening(rover), work)
 
 
+@pytest.mark.parametrize("made", ["dock", "template"])
+def test_a_plant_in_python_is_seen_where_it_says_that_it_is(made: str, tmp_path: Path) -> None:
+    """Of the docking robot and of what `rcsc new --template system` makes."""
+    if made == "dock":
+        system, order, where = dock(tmp_path / "dock"), "order supervisor dock", "drive.travelled_mm"
+    else:
+        system, order, where = (
+            tmp_path / "cart/system.toml",
+            "order supervisor deliver far_mm=700",
+            "axis.position_mm",
+        )
+        assert rcsc(["new", str(system.parent), "--template", "system"]) == 0
+        assert rcsc(["compile", "-q", str(system.parent)]) == 0
+
+    async def work(one: Page) -> None:
+        assert one.events["cell.state"]["space"] is True
+        answer = await one.ask("cell.space")
+        assert {shape["body"] for shape in answer["shapes"]} == {FIXED, *range(len(answer["bodies"]))}
+        await one.ask("run.type", line="step 2")  # the beacon is seen
+        await one.ask("run.type", line=order)
+        await one.ask("run.type", line="step 38")
+        before, after = [(await one.ask("cell.poses", tick=tick))["poses"] for tick in (0, 40)]
+        assert len(before) == len(after) == 7 * len(answer["bodies"])
+        curve = (await every_curve(one))[where]
+        assert before[0] == 0.0
+        assert after[0] > 0.2
+        assert 1000 * after[0] == pytest.approx(curve[-1][1], abs=20), "the level reads it a tick later"
+
+    talk(Opening(system), work)
+
+
 def test_nothing_is_shown_in_space_where_a_plant_has_none() -> None:
     async def work(one: Page) -> None:
         assert one.events["cell.state"]["space"] is False
