@@ -308,6 +308,8 @@ def test_what_is_no_pose_is_not_drawn(found: Found, database: Database) -> None:
 def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -> None:
     """Nothing is put anywhere: a location and a part of no data, a part that lies nowhere, a pallet without its sector."""
 
+    rings = []  # of each picture
+
     def named(at_first: int = 0, **values: int) -> tuple[list[str], tuple[str, ...]]:
         log = read(found.logs["task"])
         level = log.level("task")
@@ -319,6 +321,7 @@ def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -
             state[level.sign.index[f"to_emove.{leaf}"]] = value
         track = replace(level.track, packed=[*level.track.packed[:-1], level.track.layout.pack(*state)])
         drawn = drawn_in(database, replace(log, levels=(replace(level, track=track),))).drawn(1)
+        rings.append(drawn.svg.count('<circle class="mark"'))
         return marked(drawn.svg), drawn.caption[1:]
 
     assert named() == ([], ())
@@ -329,7 +332,9 @@ def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -
     pallet = database.locations["STATION"]
     assert named(locpt_ptr=pallet, sector=3)[0] == ["STATION(3)"]
     assert named(locpt_ptr=pallet)[0] == ["STATION(0)"]
-    assert named(locpt_ptr=0, at_first=pallet)[0] == ["STATION"] * 4  # the database is asked without a sector
+    assert rings[-2:] == [1, 1]
+    assert named(locpt_ptr=0, at_first=pallet)[0] == ["STATION"]  # the database is asked without a sector
+    assert rings[-1] == 4, "a ring at each place, and the name once"
     assert named(locpt_ptr=pallet, sector=50)[0] == []
     renamed = {"another" if name == "tbox" else name: number for name, number in database.objects.items()}
     captions = drawn_in(replace(database, objects=renamed), read(found.logs["task"])).drawn(1).caption

@@ -251,13 +251,16 @@ def lying(picture: View | Perspective, block: Block) -> Iterator[str]:
 
 
 def pointed_at(picture: View | Perspective, marks: Sequence[Mark]) -> Iterator[str]:
-    """Places: a ring each, its plumb line to the floor, its name; names that would lie on another's stand above it."""
+    """Places: a ring each, its plumb line to the floor, its name if it has one; names that would lie on another's stand above it."""
     taken: list[Point] = []
     for mark in marks:
         x, y = picture.flat(mark.at_mm)
         if picture is not TOP:
             path = _plumb(picture, mark.at_mm, 0.0)
             yield f'<path class="plumb" d="{path}" stroke="{NAMED}" stroke-opacity=".7" stroke-dasharray="3 3"/>'
+        yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="5.5" stroke="{NAMED}" stroke-width="2"/>'
+        if not mark.name:
+            continue
         wide_px = _LETTER_PX * len(mark.name)
         left = x + 20 + wide_px > picture.left_px + picture.size_px[0]
         side = -1 if left else 1
@@ -266,7 +269,6 @@ def pointed_at(picture: View | Perspective, marks: Sequence[Mark]) -> Iterator[s
             low -= _LINE_PX
         taken.append((x, low))
         yield f'<path class="leader" d="M{x + 4 * side:.1f} {y - 4:.1f}L{x + 18 * side:.1f} {low:.1f}" stroke="{NAMED}"/>'
-        yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="5.5" stroke="{NAMED}" stroke-width="2"/>'
         yield text((x + 20 * side, low), escape(mark.name), "end" if left else "start", "12", NAMED)
 
 

@@ -87,7 +87,10 @@ class DrawnCell:
         plates = list(self._plates(states))
         plate, joints, note = self._arm(plates)
         others = tuple(self._others(plates, plate))
-        marks = (*(Mark(thing.name, at) for thing in named for at in thing.at_mm), *others)
+        marks = (
+            *(Mark("" if at else thing.name, place) for thing in named for at, place in enumerate(thing.at_mm)),
+            *others,
+        )  # a pallet that is named whole has a ring at each place, and its name once
         parts = {thing.part for thing in named}
         names = {number: name for name, number in self.database.objects.items()}
         blocks = tuple(
