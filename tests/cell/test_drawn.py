@@ -307,7 +307,6 @@ def test_what_is_no_pose_is_not_drawn(found: Found, database: Database) -> None:
 
 def test_what_the_data_does_not_know_is_said(found: Found, database: Database) -> None:
     """Nothing is put anywhere: a location and a part of no data, a part that lies nowhere, a pallet without its sector."""
-
     rings = []  # of each picture
 
     def named(at_first: int = 0, **values: int) -> tuple[list[str], tuple[str, ...]]:

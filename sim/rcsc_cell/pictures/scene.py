@@ -88,7 +88,11 @@ class DrawnCell:
         plate, joints, note = self._arm(plates)
         others = tuple(self._others(plates, plate))
         marks = (
-            *(Mark("" if at else thing.name, place) for thing in named for at, place in enumerate(thing.at_mm)),
+            *(
+                Mark("" if at else thing.name, place)
+                for thing in named
+                for at, place in enumerate(thing.at_mm)
+            ),
             *others,
         )  # a pallet that is named whole has a ring at each place, and its name once
         parts = {thing.part for thing in named}
