@@ -264,10 +264,11 @@ def test_grid_and_graph_follow_a_level_through_its_tables(tmp_path: Path) -> Non
     places = random.Random(20)  # noqa: S311  # the same places each time
     seen = set()
     with seated(Opening(REPO / "tables" / "system.toml", alone=True), logs=(log,)) as seat:
-        seat.until(".view-run .ended", log.name)
+        seat.until(".ended", log.name)
         seat.press("2", "o", "3")
         seat.wait("document.querySelector('.table-choice')?.options.length")
         seat.wait("document.querySelector('.graph-place svg')")
+        seat.choose(".table-choice", "acquire ")
         seat.until(".standing", "acquire_resting is monitored")  # and beside the graph it is read to its end
         assert seat.value(
             "((one) => one.scrollWidth <= one.clientWidth)(document.querySelector('.view-tables .standing'))"
@@ -314,7 +315,7 @@ def test_what_is_told_before_a_view_is_there_is_not_taken_back(tmp_path: Path, l
         asyncio.run(_opens(server, log))
         seat.let_go()
         seat.wait("document.documentElement.dataset.ready === 'yes'")
-        seat.until(".view-run .ended", log.name)
+        seat.until(".ended", log.name)
         seat.wait("document.querySelector('#time [role=slider]').ariaValueMax === '20'")
 
 

@@ -14,7 +14,7 @@ from tests.studio.driven import HIGH, WIDE, Seat, dock, scrubbed, seated
 pytestmark = pytest.mark.needs("chromium")
 LOOK = Path(__file__).with_name("look.js").read_text(encoding="utf-8").partition("\n\n")[2]
 """What is wrong with how a page looks, a sentence each."""
-VIEWS = ("run", "tables", "graph", "cell", "plots")
+VIEWS = ("run", "tables", "graph", "cell", "plots", "system")
 DRAWER = ("values", "breaks", "script", "found", "console")
 WRONG = {
     "text is cut": "<div style='width:50px;overflow:hidden;white-space:nowrap'>a long text that is cut here</div>",
@@ -47,7 +47,7 @@ def seat(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seat]:
     with seated(Opening(system, script="dock.csv")) as one:
         one.until("#state", "paused at cycle 0")
         one.press("space")
-        one.until(".view-run .ended", "the script is at its end")
+        one.until(".ended", "the script is at its end")
         yield one
 
 

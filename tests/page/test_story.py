@@ -40,7 +40,7 @@ def by_mouse(seat: Seat) -> None:
     seat.click(seat.button("Prove, compile and open again"))
     seat.until("#state", "paused at cycle 0")
     seat.click(seat.button("Run", ".bar"))
-    seat.until(".view-run .ended", "the script is at its end")
+    seat.until(".ended", "the script is at its end")
 
 
 def by_keys(seat: Seat) -> None:
@@ -63,7 +63,7 @@ def by_keys(seat: Seat) -> None:
     seat.press("enter")
     seat.until("#state", "paused at cycle 0")
     seat.press("escape", "space")
-    seat.until(".view-run .ended", "the script is at its end")
+    seat.until(".ended", "the script is at its end")
 
 
 def _told_at_the_cell(seat: Seat) -> None:

@@ -184,12 +184,25 @@ class Seat(Browser):
         )
 
 
+HAD = """try {
+  for (const [name, value] of [['pane0', 'run'], ['pane1', 'tables'], ['about', 'gone']]) localStorage['studio.' + name] ??= value;
+} catch {}"""
+"""What a browser kept of who has used the studio."""
+
+
 @contextlib.contextmanager
 def seated(
-    opening: Opening, *, dark: bool = False, in_space: bool = False, logs: tuple[Path, ...] = ()
+    opening: Opening,
+    *,
+    dark: bool = False,
+    in_space: bool = False,
+    logs: tuple[Path, ...] = (),
+    first_time: bool = False,
 ) -> Iterator[Seat]:
-    """A studio with a browser before it, at the size that it must be readable at."""
+    """A studio with a browser before it, at the size that it must be readable at; of who comes again, and had levels beside tables."""
     with serving(opening, logs=logs) as server, Seat(WIDE, HIGH, in_space=in_space) as seat:
+        if not first_time:
+            seat.begin_with(HAD)
         seat.enter(server.address, dark=dark)
         yield seat
         wrong = [said for said in seat.said if "favicon" not in said]

@@ -170,8 +170,10 @@ class Browser:
             self.said.append(str(event["params"]["exceptionDetails"]))
         if event.get("method") == "Log.entryAdded":
             entry = event["params"]["entry"]
-            # What the page's text or scripts do has a line. The browser's own editing, of a tabulator typed into a text, has none.
-            if "lineNumber" in entry or not entry["text"].startswith("Applying inline style"):
+            # What the page's text or scripts do has a line. The browser's own editing, of a tabulator typed into a text, has none;
+            # and how it draws in space, where this machine has no graphics card, is its own affair.
+            own = entry["text"].startswith(("[.WebGL-", "[]Automatic fallback to software WebGL"))
+            if not own and ("lineNumber" in entry or not entry["text"].startswith("Applying inline style")):
                 self.said.append(f"{entry['text']} ({entry.get('url', '')}:{entry.get('lineNumber', '')})")
 
     def _answer(self) -> dict[str, Any]:

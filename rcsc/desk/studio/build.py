@@ -44,7 +44,7 @@ class Build(Concern):
     def __init__(self, path: Path, hub: Hub, live: Live, agreement: Agreement) -> None:
         """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled; agreement: Whether it may run."""
         self._path, self._hub, self._live, self._agreement = path, hub, live, agreement
-        self._said: Json = {"doing": "", "asks": ""}
+        self._said: Json = {"doing": "", "asks": "", "system": path.is_file()}
         self._over = threading.Event()
         self._stop: Callable[[], None] = lambda: None
 
@@ -141,11 +141,13 @@ class Build(Concern):
             self._told("")
 
     def _compile(self, ask: Ask | None) -> Json:
+        self._said = {**self._said, "ok": None}  # of what is proved now nothing is known
         report = self._waited(ask, "proving and compiling the tables", compiled, self._path)
         errors = [one for one in report["diagnostics"] if one["severity"] == "error"]
         self._said = {
             "doing": "",
             "asks": "",
+            "system": True,
             "ok": report["ok"],
             "findings": report["diagnostics"],
             "tables": report["tables"],

@@ -67,9 +67,9 @@ export class Bus {
     this.keys.push({ keys, what, run, where });
   }
 
-  /** Say something in the line below; `wrong` where it went wrong, `cancel` where it is under way. */
-  say(text, { wrong = false, helps = [], cancel = null } = {}) {
-    this.tell("said", { text, wrong, helps, cancel });
+  /** Say something in the line below; `wrong` where it went wrong, `cancel` where it is under way, `then` what may be done next, by the word of its button. */
+  say(text, { wrong = false, helps = [], cancel = null, then = {} } = {}) {
+    this.tell("said", { text, wrong, helps, cancel, then });
   }
 
   /** Ask, and say it where it is refused; undefined then. */

@@ -6,6 +6,7 @@ import { OrbitControls } from "./vendor/three/OrbitControls.js";
 import * as THREE from "./vendor/three/three.module.js";
 
 const [FLOOR_M, GRID_M] = [2, 0.2];
+const FROM = { front: ["from the front", [1, 0, 0.12]], left: ["from the left", [0, -1, 0.12]], above: ["from above", [0, -0.001, 1]] }; // where the eye is, of the middle
 
 export function mount(root, bus) {
   const whole = "the whole";
@@ -28,10 +29,19 @@ export function mount(root, bus) {
   const scene = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(42, 1, 0.01, 60);
   camera.up.set(0, 0, 1);
-  scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f94, 1.6));
-  const sun = new THREE.DirectionalLight(0xffffff, 1.9);
+  const sky = new THREE.HemisphereLight(0xffffff, 0x8a8f94, 1.5);
+  const sun = new THREE.DirectionalLight(0xfff4e2, 2.1);
   sun.position.set(1.5, -2, 4);
-  scene.add(sun);
+  sun.castShadow = true;
+  sun.shadow.mapSize.set(2048, 2048);
+  Object.assign(sun.shadow.camera, { left: -FLOOR_M, right: FLOOR_M, top: FLOOR_M, bottom: -FLOOR_M, near: 0.5, far: 12 });
+  sun.shadow.normalBias = 0.01;
+  const back = new THREE.DirectionalLight(0xdfe9ff, 0.7); // so that what is turned away is seen, in the dark theme too
+  back.position.set(-2, 2, 1.5);
+  const shade = new THREE.Mesh(new THREE.PlaneGeometry(4 * FLOOR_M, 4 * FLOOR_M), new THREE.ShadowMaterial({ opacity: 0.22 }));
+  shade.position.z = 0.0008;
+  shade.receiveShadow = true;
+  scene.add(sky, sun, back, shade);
   const grid = new THREE.GridHelper(2 * FLOOR_M, 2 * FLOOR_M / GRID_M);
   grid.rotation.x = Math.PI / 2;
   grid.position.z = 0.001;
@@ -49,6 +59,8 @@ export function mount(root, bus) {
       return false;
     }
     renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    renderer.shadowMap.enabled = true;
+    renderer.shadowMap.type = THREE.PCFSoftShadowMap;
     controls = new OrbitControls(camera, canvas);
     controls.listenToKeyEvents(canvas);
     controls.addEventListener("change", soon);
@@ -88,19 +100,24 @@ export function mount(root, bus) {
     for (const shape of answer.shapes) (shape.body < 0 ? room : groups[shape.body]).add(solid(shape));
     const option = (value, text) => make("option", { value }, text);
     const named = answer.bodies.map((name, at) => option(at, name || `body ${at}`));
-    look.replaceChildren(option("", whole), ...named.map((one) => one.cloneNode(true)));
+    look.replaceChildren(option("", whole), ...Object.entries(FROM).map(([key, [text]]) => option(key, text)), ...named.map((one) => one.cloneNode(true)));
+    shade.visible = grid.visible = answer.shapes.some(({ kind }) => kind === "plane");
     trace.replaceChildren(option("", "none"), ...named);
     const hand = answer.bodies.findIndex((name) => /hand|grip|tool|plate/i.test(name));
     if (hand >= 0) trace.value = String(hand);
   }
 
-  function overview() {
+  function overview(towards = [0.75, -0.62, 0.5]) {
     const box = new THREE.Box3();
     for (const one of room.children) if (!one.userData.endless) box.expandByObject(one);
     const middle = box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
     const far = box.isEmpty() ? 2 : Math.max(0.3, box.getSize(new THREE.Vector3()).length());
     controls.target.copy(middle);
-    camera.position.copy(middle).add(new THREE.Vector3(0.75, -0.62, 0.5).multiplyScalar(far));
+    const away = look.value in FROM ? 1.25 * far : far;
+    camera.position.copy(middle).add(new THREE.Vector3(...towards).multiplyScalar(away));
+    sun.target.position.copy(middle);
+    sun.position.copy(middle).add(new THREE.Vector3(1.5, -2, 4));
+    scene.add(sun.target);
     grid.material.opacity = 0.5;
   }
 
@@ -122,7 +139,7 @@ export function mount(root, bus) {
   }
 
   look.addEventListener("change", () => {
-    if (look.value === "") overview();
+    if (look.value === "" || look.value in FROM) overview(FROM[look.value]?.[1]);
     else {
       const to = groups[look.value].position;
       controls.target.copy(to);
@@ -213,6 +230,10 @@ export function mount(root, bus) {
 
   function theme() {
     scene.background = new THREE.Color(colour("paper"));
+    const dark = bus.latest("theme") === "dark";
+    sky.intensity = dark ? 2.1 : 1.5; // a dark gripper is seen before a dark wall
+    back.intensity = dark ? 1.6 : 0.7;
+    shade.material.opacity = dark ? 0.45 : 0.22;
     grid.material.color?.set(colour("strong-edge"));
     grid.material.vertexColors = false;
     grid.material.transparent = true;
@@ -237,6 +258,8 @@ function solid({ kind, size_m: [a, b, c], colour: [red, green, blue, opacity], a
   made.position.set(...at_m);
   made.quaternion.set(i, j, k, w);
   made.name = name;
+  made.castShadow = kind !== "plane" && opacity === 1;
+  made.receiveShadow = kind !== "plane";
   if (kind === "plane") {
     made.userData.endless = true;
     material.transparent = true;

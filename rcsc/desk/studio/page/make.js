@@ -17,6 +17,11 @@ export function spoken(text) {
   return text.split(/`([^`]*)`/).map((piece, at) => (at % 2 ? make("code", {}, piece) : piece));
 }
 
+/** When a tick is, as `1.04 s`; with as many digits as it takes to tell it from a tick `every` ms later. */
+export function atSecond(tick, tickMs, every = tickMs) {
+  return `${(tick * tickMs / 1000).toFixed(every % 10 ? 3 : every % 1000 ? 2 : 1)} s`;
+}
+
 const probe = make("i", { hidden: true });
 
 /** A colour of the palette as canvases take it: what it is in the theme of now. */

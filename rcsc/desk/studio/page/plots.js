@@ -162,7 +162,7 @@ export function mount(root, bus) {
       for (const graph of [...graphs]) {
         const wanted = [...new Set([...graph.names, graph.over].filter(Boolean))];
         const answer = await bus.ask("plot.curves", { names: wanted });
-        if (graphs.includes(graph)) chart(graph, answer);
+        if (graphs.includes(graph)) (answer.last > answer.first ? chart : bare)(graph, answer);
       }
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
@@ -197,11 +197,20 @@ export function mount(root, bus) {
     if (graph.plot && graph.shape === shape) graph.plot.setData(data);
     else {
       graph.plot?.destroy();
+      graph.place.replaceChildren();
       graph.plot = new uPlot(options(graph), data, graph.place);
       graph.shape = shape;
       graph.plot.over.addEventListener("click", () => choose(graph));
     }
     legends();
+  }
+
+  /** Before the first cycle there is no time to draw: no axis says that there was. */
+  function bare(graph) {
+    graph.plot?.destroy();
+    Object.assign(graph, { plot: null, shape: "", ticks: null });
+    graph.place.replaceChildren(make("p", { class: "soft" }, "No cycle yet: the curves begin with the first one."));
+    graph.legend.replaceChildren(...[...graph.names, graph.over].filter(Boolean).map((name) => make("li", {}, name)));
   }
 
   function across(graph) {

@@ -1,17 +1,18 @@
-// The run: every level beside the others, what is done to it, and why a line did not match.
+// The levels: every one beside the others, what is done to it, and why a line did not match.
 
 import { doLine, typeLine } from "./bus.js";
+import { exampled } from "./controls.js";
 import { changes, exchanges, short } from "./exchanges.js";
 import { faults, linesOf } from "./level.js";
 import { make, spoken } from "./make.js";
 import { lookAt } from "./moments.js";
 
-const RATES = [["4 times the clock", "4"], ["real time", "1"], ["20 times", "20"], ["as fast as it goes", ""], ["a quarter", "0.25"], ["a tenth", "0.1"]];
-
 export function mount(root, bus) {
   const cards = make("div", { class: "cards scroll", role: "list", "aria-label": "Levels" });
   const drawer = Drawer(bus);
-  root.append(toolbar(bus, drawer), cards, drawer.root);
+  root.append(cards, drawer.root);
+  bus.on("drawer", (tab) => drawer.show(tab, true));
+  bus.on("typed", ({ line, shown }) => drawer.said(line, shown));
   const known = new Map(); // by level: its card
   let levels = "";
 
@@ -44,63 +45,14 @@ export function mount(root, bus) {
   bus.on("selection", (_, changed) => { if (!changed || [...changed].some((one) => one !== "tick")) soon(); }); // of another tick the moment comes
 }
 
-// --- what is done to all levels ---
-
-function toolbar(bus, drawer) {
-  const type = (line) => doLine(bus, line).then((answer) => { if (answer) drawer.said(line, answer.shown); return answer; });
-  const go = make("button", { type: "button", class: "go", onclick: () => bus.try(bus.latest("run.state")?.going ? "run.pause" : "run.go") }, "Run");
-  const step = make("button", { type: "button", onclick: () => type("step") }, "Step ", make("kbd", {}, "s"));
-  const undo = make("button", { type: "button", onclick: () => type("undo") }, "Undo ", make("kbd", {}, "u"));
-  const rate = make("select", { "aria-label": "How fast", onchange: () => bus.try("run.rate", { rate: rate.value ? Number(rate.value) : null }) },
-    RATES.map(([text, value]) => make("option", { value }, text)));
-  const until = make("input", { "aria-label": "Run until a condition holds", placeholder: "run until: task.cur_state = state_3", spellcheck: "false", list: "run-words" });
-  const back = make("button", { type: "button", class: "back", hidden: true, onclick: () => bus.select({ tick: bus.latest("run").last, follow: true }) }, "Back to now");
-  const live = make("button", { type: "button", hidden: true, onclick: () => bus.try("time.live") }, "Back to the live run");
-  const said = make("span", { class: "grow soft ended", role: "status" });
-  const past = () => {
-    const run = bus.latest("run");
-    back.hidden = !run?.open || run.source === "log" || bus.selection.tick === run.last;
-  };
-  bus.on("run", (run) => {
-    const of = bus.latest("run.state");
-    const log = run.source === "log";
-    go.replaceChildren(of.going ? "Pause " : "Run ", make("kbd", {}, "space"));
-    go.setAttribute("aria-pressed", Boolean(of.going));
-    for (const one of [go, step, until, rate]) one.disabled = !of.open || log;
-    undo.disabled = !of.open || log || !of.undo;
-    if (document.activeElement !== rate) {
-      const value = of.rate ? String(of.rate) : "";
-      if (![...rate.options].some((one) => one.value === value)) rate.append(make("option", { value }, `${value} times`));
-      rate.value = value;
-    }
-    live.hidden = !log;
-    said.replaceChildren(...(log ? [...spoken(run.finding ? `finding: ${run.finding.text}; ` : ""), `log ${run.name}${run.other ? `, of system ${run.other}, which is not the one that is open here` : ""}, ${run.text}`] : [of.ended ?? ""]));
-    said.title = said.textContent;
-    past();
-  });
-  bus.on("selection", past);
-  bus.key("space", "Run, or pause", () => go.click(), "Run");
-  bus.key("s", "One cycle of all levels", () => step.click(), "Run");
-  bus.key("u", "Undo the last cycle, or what was set", () => undo.click(), "Run");
-  bus.key("r", "Run until a condition holds: type it", () => until.focus(), "Run");
-  bus.key("c", "Type a command of the shell", () => drawer.show("console", true), "Run");
-  bus.key("i", "Order a level", () => drawer.show("script", true), "Run");
-  bus.key("b", "Breakpoints, faults, broken buffers", () => drawer.show("breaks", true), "Run");
-  bus.key("p", "Proof, findings and logs", () => drawer.show("found", true), "Run");
-  bus.key("q", "Requirements, as they stand", () => drawer.show("required", true), "Run");
-  bus.key("v", "Variables of the level chosen", () => drawer.show("values", true), "Run");
-  return make("div", { class: "bar" }, go, step, undo, rate,
-    make("form", { class: "until", onsubmit: (event) => { event.preventDefault(); if (until.value.trim()) type(`run until ${until.value.trim()}`); } }, until),
-    back, live, said);
-}
-
 function closed(bus) {
-  const build = bus.latest("build.state") ?? {}, state = bus.latest("run.state") ?? {};
+  const build = bus.latest("build.state"), state = bus.latest("run.state");
+  if (!build || !state) return make("div", { class: "closed soft" }, "Connecting …");
   const findings = (build.findings ?? []).filter(({ severity }) => severity === "error");
   return make("div", { class: "closed" },
     build.asks && !build.doing ? asking(bus, build.asks) : null,
     make("h2", {}, build.doing ? `${build.doing[0].toUpperCase()}${build.doing.slice(1)}` : "No system runs"),
-    build.doing ? null : make("p", { class: "pre" }, ...spoken(state.why ?? "not connected")),
+    build.doing ? null : make("p", { class: "pre" }, ...spoken(state.why ?? "")),
     ...findings.slice(0, 20).map(finding),
     findings.length > 20 ? make("p", { class: "soft" }, `and ${findings.length - 20} more`) : null,
     build.doing || build.asks ? null : make("button", { type: "button", onclick: () => bus.try("build.open") }, "Prove, compile and open again"));
@@ -180,10 +132,17 @@ function Card(bus, level) {
     const alone = now?.now.every(([, line]) => line); // what was set by hand may choose another table, of which no line ran
     const lines = alone ? now.now : [...box.before, ...(box.lines.length ? box.lines : [""]).map((line) => [box.table, line])];
     tables.replaceChildren(...linesOf(bus, level, lines, box.ran), ...faults(now ? now.fault : box.fault, box.wrong));
-    body.replaceChildren(...exchanges(box), ...changes(box));
+    body.replaceChildren(...(now ? lost(bus.latest("run.state").buffers ?? [], level.name) : []), ...exchanges(box), ...changes(box));
     why();
   }
   return { root, show, last: () => last };
+}
+
+/** Buffers of a level that were broken by hand: its neighbour hears nothing, or it does not. */
+function lost(buffers, level) {
+  const own = (name) => name.startsWith(`${level}.`);
+  return buffers.filter(({ name, to, frozen }) => frozen && (own(name) || to.split(", ").some(own)))
+    .map(({ name, to }) => make("p", { class: "wrong" }, make("strong", {}, "✗ "), make("code", {}, name), " → ", make("code", {}, to), " is broken: ", own(name) ? "what is written to it is lost" : "nothing new comes from it"));
 }
 
 function reasonTable(table, only) {
@@ -332,8 +291,9 @@ function valuesTab(bus) {
 
 function breaksTab(bus) {
   const list = make("ul"), faults = make("ul"), buffers = make("ul");
-  const what = make("input", { "aria-label": "A condition, or a line, to stop at", title: "A condition, or a line: task.cur_state = state_3, or task.acquire.5", placeholder: "task.acquire.5, or x > 3", size: "44", spellcheck: "false", list: "run-words" });
+  const what = make("input", { "aria-label": "A condition, or a line, to stop at", placeholder: "a line, or a condition", size: "44", spellcheck: "false", list: "run-words" });
   const type = (line) => doLine(bus, line);
+  exampled(bus, (condition, line) => { what.title = `A condition, as ${condition}, or a line, as ${line}`; });
   const add = make("form", { class: "bar", onsubmit: async (event) => { event.preventDefault(); if (await type(`break ${what.value}`)) what.value = ""; } }, what, make("button", {}, "Break there"));
   let before = "";
   bus.on("run.state", (state) => {
@@ -424,22 +384,29 @@ function foundTab(bus) {
     catch (error) { bus.say(error.message, { wrong: true, helps: error.helps }); }
     if (cancel === mine) { cancel = null; stop.hidden = true; doing.textContent = ""; }
   }
+  const openLog = (name) => job("log.open", { name }, () => bus.say(`${name} is shown to everybody`));
   async function list() {
     const found = await bus.try("log.list") ?? [];
-    const named = ({ name, bytes, changed_s: when, finding }) => make("li", {}, make("button", { type: "button", onclick: () => job("log.open", { name }, () => bus.say(`${name} is shown to everybody`)) }, name),
+    const named = ({ name, bytes, changed_s: when, finding }) => make("li", {}, make("button", { type: "button", onclick: () => openLog(name) }, name),
       make("span", { class: "soft" }, ` ${bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${Math.ceil(bytes / 1e3)} kB`}, ${new Date(when * 1000).toLocaleString()}`),
       finding ? make("div", { class: "breaks" }, ...spoken(finding)) : null);
     const part = (title, some) => (some.length ? [make("h3", {}, title), make("ul", {}, some.map(named))] : []);
     logs.replaceChildren(...part("Findings: runs that break something", found.filter(({ finding }) => finding)), ...part("Runs that were kept", found.filter(({ finding }) => !finding)));
     if (!found.length) logs.replaceChildren(make("p", { class: "soft" }, ...spoken("no logs here: `rcsc run --log`, `rcsc prove --log` and campaigns write them")));
+    return found;
   }
   const prove = make("button", { type: "button", onclick: () => job("build.prove", {}, (answer) => {
     text.hidden = false;
     text.textContent = answer.text;
-    bus.say(answer.status === 0 ? "the levels are proved together" : `not all is proved: ${answer.logs.length} runs show it`, { wrong: answer.status !== 0 });
-    list();
+    const shown = answer.logs.length, runs = shown ? `${shown} ${shown === 1 ? "run shows" : "runs show"} it` : "the text below says what";
+    list().then((found) => {
+      const [first] = answer.logs.flatMap((path) => found.filter(({ name }) => path.endsWith(name)));
+      bus.say(answer.status === 0 ? "the levels are proved together" : `not all is proved: ${runs}`, { wrong: answer.status !== 0,
+        then: first ? { [shown === 1 ? "Show the run" : "Show the first run"]: () => openLog(first.name) } : {} });
+    });
   }) }, "Prove the levels together");
   const again = make("button", { type: "button", onclick: () => job("build.open", {}, (answer) => bus.say(answer.ok ? "proved, compiled and opened anew" : "the tables are not proved", { wrong: !answer.ok })) }, "Prove, compile and open anew");
+  bus.on("prove", () => prove.click());
   bus.on("build.state", (state) => { if (!cancel) doing.textContent = state.doing; });
   return { root: make("div", { class: "column" }, make("div", { class: "bar" }, again, prove, make("button", { type: "button", onclick: list }, "List logs again"), stop, doing),
     make("div", { class: "scroll" }, text, logs)), shown: list, focus: () => prove.focus() };

@@ -1,6 +1,7 @@
 // The time line: which line each level ran, at every tick. Everybody looks at the tick that is chosen here.
 
-import { colour, make } from "./make.js";
+import { controls } from "./controls.js";
+import { atSecond, colour, make } from "./make.js";
 import { followMoments, lookAt } from "./moments.js";
 
 const [AXIS, ROW, LEAST] = [18, 20, 8]; // pixels, pixels, ticks
@@ -11,10 +12,10 @@ export function mount(root, bus) {
   const names = make("div", { class: "names" });
   const slider = make("div", { class: "line", role: "slider", tabindex: "0", "aria-label": "Tick" }, canvas);
   const readout = make("output", { class: "grow readout" });
-  const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find: level.leaf = value, not NAME", spellcheck: "false", list: "run-words" });
+  const find = make("input", { "aria-label": "Find a tick by a condition", placeholder: "find a tick where …", spellcheck: "false", list: "run-words" });
   const finds = bus.answers("time.find");
   const bar = make("div", { class: "bar" });
-  root.append(bar, make("div", { class: "tracks scroll" }, names, slider));
+  root.append(...(bus.answers("run.type") ? [controls(bus)] : []), bar, make("div", { class: "tracks scroll" }, names, slider));
 
   let tracks = { era: -1, to: -1, first: 0, last: 0, levels: new Map(), marks: [] };
   let key = "", asking = false, again = false, due = false;
@@ -130,7 +131,7 @@ export function mount(root, bus) {
       on.fillStyle = say.soft;
       on.fillText(`${tick}`, at + 3, AXIS / 2);
       const left = on.measureText(`${tick}`).width;
-      if (x(step) - x(0) > 86) { on.globalAlpha = 0.75; on.fillText(` ${(tick * tickMs / 1000).toFixed(step * tickMs < 1000 ? 2 : 1)} s`, at + 3 + left, AXIS / 2); on.globalAlpha = 1; }
+      if (x(step) - x(0) > 86) { on.globalAlpha = 0.75; on.fillText(` ${atSecond(tick, tickMs, step * tickMs)}`, at + 3 + left, AXIS / 2); on.globalAlpha = 1; }
     }
   }
 
@@ -196,7 +197,7 @@ export function mount(root, bus) {
     if (!run?.open || tick === null || tracks.era < 0) { readout.textContent = ""; return; }
     const lines = run.levels.map(({ name }) => { const stands = standing(name, tick).change; return stands ? `${name} ${stands[1]} ${stands[2] || "-"}` : name; });
     const here = tracks.marks.filter((mark) => mark.tick === tick).map(({ text }) => text);
-    const text = `tick ${tick} of ${run.last}, ${(tick * run.tick_ms / 1000).toFixed(2)} s${here.length ? `; here: ${here.join("; ")}` : ""}${tracks.to < tracks.last ? `; reading which lines ran: tick ${Math.max(0, tracks.to)} of ${tracks.last}` : ""}`;
+    const text = `tick ${tick} of ${run.last}, ${atSecond(tick, run.tick_ms)}${here.length ? `; here: ${here.join("; ")}` : ""}${tracks.to < tracks.last ? `; reading which lines ran: tick ${Math.max(0, tracks.to)} of ${tracks.last}` : ""}`;
     if (readout.textContent !== text) { readout.textContent = text; readout.title = text; }
     slider.setAttribute("aria-valuemin", run.first);
     slider.setAttribute("aria-valuemax", run.last);

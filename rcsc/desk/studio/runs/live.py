@@ -244,8 +244,9 @@ class Live(Concern):
         }
 
     def _said(self, system: System) -> str:
-        seconds = system.tick * system.description.tick_ms / 1000
-        return f"{'runs' if self._going else 'paused'} at cycle {system.tick}, {seconds:.2f} s"
+        tick_ms = system.description.tick_ms
+        digits = 3 if tick_ms % 10 else 2  # two ticks are told apart
+        return f"{'runs' if self._going else 'paused'} at cycle {system.tick}, {system.tick * tick_ms / 1000:.{digits}f} s"
 
     def changed(self) -> None:
         """Tell every page the state of the run."""

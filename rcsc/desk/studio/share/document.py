@@ -16,8 +16,8 @@ from markupsafe import Markup
 from rcsc.views.pages.frame import environment, hashed, packed
 
 PARTS = (
-    "make.js", "bus.js", "keys.js", "moments.js", "exchanges.js", "level.js", "film.js", "timeline.js", "vendor/uplot/uPlot.js", "plots.js",
-    "player.js",
+    "make.js", "bus.js", "keys.js", "moments.js", "exchanges.js", "level.js", "film.js", "controls.js", "timeline.js",
+    "vendor/uplot/uPlot.js", "plots.js", "player.js",
 )  # fmt: skip
 """Modules of the studio's page of which a file's script is made; each takes from those before it alone."""
 STYLES = ("vendor/uplot/uPlot.css", "parts.css")

@@ -25,8 +25,9 @@ export class Desk {
   #bus;
   #heard = new Set();
   #stop = null;
-  #last = null; // what was asked last that may change the text
+  #last = null; // the answer to the last change of this file, which may be under way
   #decided = 0; // how often it was decided here whose text is on disk
+  #sought = null; // { file, code, message } of the finding to go to
   #repairs = new Map(); // by file, version and finding
   #types = new Map(); // heading -> { type, unit }, of the last text that was looked at
 
@@ -38,6 +39,12 @@ export class Desk {
       else if (changed?.has("level") && this.follows) this.follow(now.level);
     });
     bus.on("moment", () => this.#moved());
+    let found = "";
+    bus.on("time.state", ({ source, name, finding }) => { // a finding that is opened is seen at its table
+      const now = source === "log" && finding?.level ? `${name} ${finding.level}` : "";
+      if (now && now !== found) this.follow(finding.level);
+      found = now;
+    });
     addEventListener("focus", () => { if (this.file) this.open(this.file, this.table); });
   }
 
@@ -75,12 +82,31 @@ export class Desk {
     return (this.doc?.findings ?? []).filter((one) => (one.table === this.table) === here);
   }
 
+  /** Open a file, and go to one of its findings once they are known. */
+  async seek(file, code, message) {
+    this.follow("");
+    this.#sought = { file, code, message };
+    await this.open(file);
+    this.#arrive();
+  }
+
+  #arrive() {
+    const { file, code, message } = this.#sought ?? {};
+    if (file !== this.file || !this.doc?.known) return;
+    this.#sought = null;
+    const one = this.doc.findings.find((each) => each.code === code && each.message === message);
+    if (!one) return;
+    if (one.table) this.open(file, one.table);
+    this.#bus.tell("reveal", one.id);
+  }
+
   async open(file, table = "") {
     if (!file) return;
     const changed = file !== this.file;
     try {
       if (changed) {
         this.#stop?.();
+        this.#last = null; // its versions say nothing of another file
         Object.assign(this, { file, doc: null, table, condition: null });
         this.#types.clear();
         this.#stop = this.#bus.on(`tables.file/${file}`, (doc) => this.#take(doc));
@@ -100,16 +126,27 @@ export class Desk {
     }
   }
 
-  /** Ask something about the text as it is here; what is changed stays in view. */
+  /** Ask something about the text as it is here; what is changed stays in view, and is changed in turn. */
   async ask(kind, body = {}, options = {}) {
-    if (kind.startsWith("tables.") || kind === "graph.draw") this.follow("");
-    const answer = this.#asked(kind, body, options);
-    if (kind.startsWith("tables.")) this.#last = answer.catch(() => {});
+    if (!kind.startsWith("tables.") && kind !== "graph.draw") return this.#asked(kind, body, options);
+    this.follow("");
+    const answer = this.#inTurn(kind, { ...this.#place, ...body }, options);
+    this.#last = answer.catch(() => {});
     return answer;
   }
 
+  /** Change the text as the change before leaves it: keys are quicker than answers. What others changed meanwhile is not changed unseen. */
+  async #inTurn(kind, body, options) {
+    const left = await this.#last;
+    return this.#bus.ask(kind, { ...body, version: Math.max(left?.version ?? 0, body.version) }, options);
+  }
+
   #asked(kind, body, options) {
-    return this.#bus.ask(kind, { file: this.file, version: this.doc?.version ?? 0, table: this.table, ...body }, options);
+    return this.#bus.ask(kind, { ...this.#place, ...body }, options);
+  }
+
+  get #place() {
+    return { file: this.file, version: this.doc?.version ?? 0, table: this.table };
   }
 
   /** The same; where it is refused it is said, and undefined returned. */
@@ -215,6 +252,7 @@ export class Desk {
     this.#selected();
     this.tell();
     if (stale && doc.known) this.filter(this.condition.text);
+    this.#arrive();
   }
 
   #selected() {
@@ -226,6 +264,7 @@ export class Desk {
     if (!this.file) {
       const first = files.find((each) => each.first) ?? files.find(({ levels }) => levels.length) ?? files[0];
       if (first) this.open(first.file, first.tables[0]);
+      if (first?.levels.length && !this.follows) this.follow(first.levels[0]); // the table that runs, until another is chosen
     } else {
       this.open(this.file, this.table); // the connection was lost meanwhile
     }

@@ -91,7 +91,7 @@ export function mount(root, bus) {
     elsewhere.replaceChildren(...found.slice(0, 50).map((one) => make("div", { class: one.severity },
       make("strong", {}, { error: "Wrong", warning: "Perhaps wrong", note: "Note" }[one.severity] ?? one.severity),
       ` ${one.table ? `in table ${one.table}` : one.file ? `in ${one.file.split("/").pop()}` : `in line ${(one.area?.[0][0] ?? 0) + 1} of the text`}: `, ...spoken(one.message), " ",
-      one.table && !one.file ? button("Show", "Show that table", () => desk.open(desk.file, one.table), { class: "small" }) : "",
+      one.table && !one.file ? button("Show", "Show it at its table", () => { desk.open(desk.file, one.table); sheet.reveal(one.id); }, { class: "small" }) : "",
       ...one.help.map((help) => make("div", { class: "help" }, "Help: ", ...spoken(help))))));
   }
 

@@ -28,6 +28,7 @@ export class SheetGrid {
     desk.on(() => this.draw());
     bus.on("selection", ({ line }, changed) => { if (!changed || changed.has("line") || changed.has("table")) this.#mark(line, changed?.has("line")); });
     bus.on("moment", () => this.#lit());
+    bus.on("reveal", (id) => this.reveal(id));
   }
 
   get at() {
@@ -150,6 +151,13 @@ export class SheetGrid {
       else this.#table.tBodies[0].prepend(note);
     }
     this.#witness(shown, found);
+  }
+
+  /** Bring a finding of the table into sight; what it tells, and where it is. */
+  reveal(id) {
+    const note = this.#table.querySelector(`[data-finding="${CSS.escape(id)}"]`);
+    note?.scrollIntoView({ block: "center" });
+    note?.querySelector("button")?.focus({ preventScroll: true });
   }
 
   #told(one) {
@@ -320,7 +328,7 @@ export class SheetGrid {
     else if (moves[key]) { done(); this.#step(...moves[key], { extend, far: ctrl }); } else if (key === "Home") { done(); this.go({ line: ctrl ? 0 : this.#at.line, column: -1 }, true, extend); } else if (key === "End") { done(); this.go({ line: ctrl ? rows.length - 1 : this.#at.line, column: columns.length - 1 }, true, extend); } else if (key === "PageDown" || key === "PageUp") { done(); this.#step(key === "PageDown" ? Math.min(10, rows.length - 1 - this.#at.line) : -Math.min(10, this.#at.line), 0, { extend }); } else if (key === "Tab") {
       const next = this.#at.column + (extend ? -1 : 1);
       if (next >= -1 && next < columns.length) { done(); this.go({ line: this.#at.line, column: next }); }
-    } else if (key === "Enter" || key === "F2") { done(); this.edit(this.#at); } else if (key === "Escape") { if (this.#anchor) { done(); this.go(this.#at); } } else if (ctrl && key === "Delete") { done(); this.deleteLines(); } else if (key === "Delete" || key === "Backspace") { done(); this.#clear(); } else if (ctrl && key.toLowerCase() === "z") { done(); if (extend) this.#desk.redo(); else this.#desk.undo(); } else if (ctrl && key.toLowerCase() === "y") { done(); this.#desk.redo(); } else if (ctrl && key.toLowerCase() === "a") { done(); this.go({ line: 0, column: -1 }); this.go({ line: rows.length - 1, column: columns.length - 1 }, true, true); } else if (!ctrl && key.length === 1) { done(); this.edit(this.#at, key); }
+    } else if (key === "Enter" || key === "F2") { done(); this.edit(this.#at); } else if (key === "Escape") { if (this.#anchor) { done(); this.go(this.#at); } } else if (ctrl && key === "Delete") { done(); this.deleteLines(); } else if (key === "Delete" || key === "Backspace") { done(); this.#clear(); } else if (ctrl && key.toLowerCase() === "z") { done(); if (extend) this.#desk.redo(); else this.#desk.undo(); } else if (ctrl && key.toLowerCase() === "y") { done(); this.#desk.redo(); } else if (ctrl && key.toLowerCase() === "a") { done(); this.go({ line: 0, column: -1 }); this.go({ line: rows.length - 1, column: columns.length - 1 }, true, true); } else if (!ctrl && key.length === 1) { done(); if (key === " ") this.#bus.keys.find(({ keys }) => keys === "space")?.run(); else this.edit(this.#at, key); } // no value begins with a space: it runs and pauses, here too
   }
 
   #press(event) {
@@ -405,7 +413,7 @@ export class SheetGrid {
     if (!done) {
       delete cell.dataset.text;
       this.draw();
-      if (focus) { this.edit(at, text); }
+      if (focus && !this.#editing) this.edit(at, text); // who types elsewhere by now goes on there
     }
   }
 
