@@ -13,7 +13,15 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.lang.interpret import initial, run_table
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text
-from rcsc.lang.syntax.expected import ELSEWHERE, operator_meant, word_meant
+from rcsc.lang.syntax.expected import (
+    ASSIGNS,
+    ELSEWHERE,
+    PARTS_CALLS,
+    STATES,
+    operator_meant,
+    word_meant,
+)
+from rcsc.lang.syntax.rows import LAST_BAR, NO_LAST_BAR
 from tests.support.programs.stages import program_of, refused, reported
 from tests.support.programs.texts import table
 
@@ -93,6 +101,89 @@ def test_a_word_in_the_wrong_case_or_misspelled_is_named(text: str, at: str, mea
     found, place = shown(HEAD + text)
     assert place == at
     assert found.help == ((f"did you mean `{meant}`?",) if meant else ())
+
+
+@pytest.mark.parametrize(
+    ("text", "at", "help_"),
+    [
+        ("procedure p { speed = 3 }", "=", ASSIGNS),
+        ("procedure p { next now = idle }", "=", ASSIGNS),
+        ("procedure p { local n : int 0 .. 5 = 3 }", "=", ASSIGNS),
+        (table("t", "line | ready || procedures", "a | true || speed = 3"), "=", ASSIGNS),
+        ("const c := 3", ":=", STATES),
+        ("procedure p { speed := 3, go := true }", ",", PARTS_CALLS),
+        (table("t", "line | ready || procedures", "a | true || fail(1), fail(2)"), ",", PARTS_CALLS),
+        (table("t", "line | ready || procedures", "a | true || go := true, fail(2)"), ",", PARTS_CALLS),
+    ],
+)
+def test_a_sign_written_for_another_is_told_with_the_right_one(text: str, at: str, help_: str) -> None:
+    found, there = shown(HEAD + text)
+    assert (there, found.help) == (at, (help_,))
+
+
+ROWS = "| line | ready || speed | go |\n|------|-------||-------|----|\n"
+
+
+@pytest.mark.parametrize(
+    "row", ["| a | true || 3 | true", "| a | true || 3 | true  # said aside |", "| a || 3"]
+)
+def test_a_row_without_its_last_bar_is_refused_at_its_end(row: str) -> None:
+    found, at = shown(f"{HEAD}table t {{\n{ROWS}{row}\n}}\n")
+    assert (found.code, found.message, found.help) == (Code.RAGGED_ROW, NO_LAST_BAR, (LAST_BAR,))
+    said = row.partition("#")[0].rstrip()
+    assert (at, found.primary.span.end) == (said[-1], len(f"{HEAD}table t {{\n{ROWS}{said}"))
+
+
+def test_a_row_that_ends_before_the_last_column_names_the_next() -> None:
+    found, _ = shown(f"{HEAD}table t {{\n{ROWS}| a | true || 3 |\n}}\n")
+    assert found.message == "this row has 1 cells of actions, the heading 2"
+    assert found.help[-1] == "nothing stands below `go`: a row ends with `|` after its last cell, be it empty"
+
+
+# --- units ---
+
+GAPS = "input gap : int 0 .. 110 [mm]\ninput held : int 0 .. 60 [s]\noutput go : bool\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "help_"),
+    [
+        ("assume a : gap < 2 [cm]", "cm", "write it in `mm`: `2 [cm]` is `20 [mm]`"),
+        ("const far = 50 [cm]\nassume a : gap < far", "cm", "write it in `mm`: `50 [cm]` is `500 [mm]`"),
+        ("const far = 2 [km]\n", "km", "write it in `m`: `2 [km]` is `2000 [m]`"),
+        ("const slow = 2 [min]\nassume a : held < slow", "min", "write it in `s`: `2 [min]` is `120 [s]`"),
+        ("state w : int 0 .. 11 [cm]\nprocedure p { w := gap }", "cm", "write it in `mm`: 1 cm is 10 mm"),
+        (
+            table("t", "line | gap || go", "a | > 3 [cm] || true"),
+            "cm",
+            "write it in `mm`: `3 [cm]` is `30 [mm]`",
+        ),
+    ],
+)
+def test_a_unit_that_is_none_is_told_once_with_how_to_write_it(text: str, unit: str, help_: str) -> None:
+    found, at = shown(GAPS + text)
+    assert (found.message, at) == (f"`{unit}` is not a unit", unit)
+    assert found.help == (f"{help_}; or declare it: `unit {unit}`, which nothing converts",)
+
+
+def test_a_unit_that_is_like_none_is_declared() -> None:
+    found, _ = shown(f"{GAPS}const far = 5 [furlong]")
+    assert found.help == ("declare it: `unit furlong`",)
+
+
+@pytest.mark.parametrize(
+    ("limit", "help_"),
+    [
+        ("2 [m]", ("units are never converted: write one side in the other, 1 m is 1000 mm",)),
+        ("2 [s]", ()),
+    ],
+)
+def test_two_units_of_one_quantity_say_what_one_is_in_the_other(limit: str, help_: tuple[str, ...]) -> None:
+    found, _ = shown(f"{GAPS}assume a : gap < {limit}")
+    assert found.help == help_
+
+
+# --- names ---
 
 
 def test_a_name_is_no_word_of_the_language() -> None:

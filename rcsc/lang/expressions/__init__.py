@@ -21,7 +21,7 @@ brute force on pairs of edge values. Everything takes one pass over the expressi
 
 Modules, in the order the data flows: `scope` has the names of a program and collects what is wrong with their use;
 `literals` reads numbers, `types` type expressions; `typed` finds the names in an expression and types it, by
-`operators`, which bound results by `intervals`, and by `words`, which make what is said of bits arithmetic, and by
-`previous`, which makes a state of each leaf that something looks back at; `conditions` makes a table's cells tests,
-`placing` gives what stands in a cell its place in the file.
+`operators`, which bound results by `intervals` and know of `units` what one comes to in another, and by `words`, which
+make what is said of bits arithmetic, and by `previous`, which makes a state of each leaf that something looks back at;
+`conditions` makes a table's cells tests, `placing` gives what stands in a cell its place in the file.
 """

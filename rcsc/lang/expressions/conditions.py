@@ -105,6 +105,9 @@ class Tests:
         if alone and INMODE in text:  # as it reads in any row
             text = spell_condition(written, True)
         if value is False or box == ():
+            kinds = (self.scope.leaves[name].type for name in names)
+            if self.scope.unsure(*(kind.unit for kind in kinds if isinstance(kind, Int | Real))):
+                return None
             helps = "the line could never match: mend the condition, or take the line out"
             self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", cell.span, helps)
             return None

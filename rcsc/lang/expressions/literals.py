@@ -34,7 +34,7 @@ def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
         message = "no 64-bit integer holds this number"
         scope.report(Code.TOO_WIDE, message, written.span, f"the greatest is {U64_MAX}")
         return None
-    kind = Int(value, value, scope.unit(written.unit))
+    kind = Int(value, value, scope.unit(written.unit, value))
     return Typed(Literal(value, kind, written.span), written.unit is None)
 
 

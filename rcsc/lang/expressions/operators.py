@@ -7,6 +7,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.source import Span
 from rcsc.lang.expressions import intervals
 from rcsc.lang.expressions.scope import Scope, normal, spell_unit
+from rcsc.lang.expressions.units import apart
 from rcsc.lang.interpret import fold
 from rcsc.lang.model import (
     I64_MAX,
@@ -163,7 +164,10 @@ def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit |
         return ()
     for unit in units:
         if unit != units[0]:
-            scope.report(Code.UNIT, f"the units differ: {spell_unit(units[0])} and {spell_unit(unit)}", span)
+            if not scope.unsure(units[0], unit):
+                helps = apart(units[0], unit)
+                message = f"the units differ: {spell_unit(units[0])} and {spell_unit(unit)}"
+                scope.report(Code.UNIT, message, span, *([helps] if helps else []))
             return None
     return units[0]
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
+from rcsc.lang.expressions.units import written_in
 from rcsc.lang.leaves import free_name
 from rcsc.lang.model import (
     Declared,
@@ -210,21 +211,25 @@ class Scope:
             return f"if it is a subordinate: `commands {name} : LINK` declares it"
         return ""
 
-    def unit(self, written: tree.Unit | None) -> Unit:
-        """Return the unit in normal form; () for none."""
+    def unit(self, written: tree.Unit | None, number: int | None = None) -> Unit:
+        """Return the unit in normal form; () for none. `number`: what it stands behind, for messages."""
         if written is None:
             return ()
         powers: dict[str, int] = {}
         for factor in written.factors:
             if factor.name.text not in self.units:
-                self.report(
-                    Code.UNIT,
-                    f"`{factor.name.text}` is not a unit",
-                    factor.name.span,
-                    f"declare it: `unit {factor.name.text}`",
-                )
+                name = factor.name.text
+                alone = len(written.factors) == 1 and factor.power == 1
+                instead = written_in(name, self.units, number if alone else None)
+                declares = f"declare it: `unit {name}`"
+                helps = (f"{instead}; or {declares}, which nothing converts",) if instead else (declares,)
+                self.report(Code.UNIT, f"`{name}` is not a unit", factor.name.span, *helps)
             powers[factor.name.text] = powers.get(factor.name.text, 0) + factor.power
         return normal(powers)
+
+    def unsure(self, *units: Unit) -> bool:
+        """Return whether one of the units has a name that is none, which was reported: what follows from it is not."""
+        return any(name not in self.units for unit in units for name, _ in unit)
 
 
 _FIELDS = {

@@ -130,7 +130,7 @@ def _bounds(
     unit = scope.unit(written.unit)
     for bound, place in ((low, written.low), (high, written.high)):
         other = bound.unit()
-        if other and unit and other != unit:
+        if other and unit and other != unit and not scope.unsure(other, unit):
             scope.report(Code.UNIT, "the bounds of a range have one unit", place.span)
         unit = unit or other
     return low, high, unit

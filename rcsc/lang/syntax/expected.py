@@ -112,6 +112,15 @@ _HELPS = {
     "ORDER": "a field of a link stands in `order { NAME : TYPE }` or in `report { NAME : TYPE }`",
 }
 """Help where a word of the protocol is missing, by the terminal."""
+ASSIGNS = "write `:=`: that assigns, `=` compares"
+STATES = "write `=`: a declaration states its value, `:=` assigns in a procedure"
+PARTS_CALLS = "write `;`: calls and assignments that follow each other are parted by it, as `first; second`"
+_INSTEAD = {
+    ("=", "_BECOMES"): ASSIGNS,
+    (":=", "EQUAL"): STATES,
+    (",", "SEMICOLON"): PARTS_CALLS,
+}
+"""Help where one sign was written for another, by what was found and what may stand there."""
 _NOT_FOR = "parentheses say what has held: `not (c for 2 [s])`, or `(not c) for 2 [s]`"
 _FOR_WITHIN = {
     ",": "each subordinate has a declaration of its own: `commands NAME : LINK`",
@@ -127,7 +136,8 @@ def missing_word(found: str, terminals: Iterable[str]) -> str:
         return _NOT_FOR
     if "WITHIN" in names and found in _FOR_WITHIN:
         return _FOR_WITHIN[found]
-    return next((text for name, text in _HELPS.items() if name in names), "")
+    instead = next((text for (sign, name), text in _INSTEAD.items() if found == sign and name in names), "")
+    return instead or next((text for name, text in _HELPS.items() if name in names), "")
 
 
 def operator_meant(text: str, at: int) -> tuple[int, str] | None:

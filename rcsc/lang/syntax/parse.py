@@ -19,7 +19,14 @@ from rcsc.base.host.files import write_atomically
 from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
-from rcsc.lang.syntax.expected import ELSEWHERE, expected, missing_word, operator_meant, word_meant
+from rcsc.lang.syntax.expected import (
+    ELSEWHERE,
+    PARTS_CALLS,
+    expected,
+    missing_word,
+    operator_meant,
+    word_meant,
+)
 from rcsc.lang.syntax.rows import (
     ACTION_WORDS,
     BITS,
@@ -28,10 +35,12 @@ from rcsc.lang.syntax.rows import (
     COLUMNS,
     EMPTY_CELL,
     IN_QUOTES,
+    LAST_BAR,
     MARKS,
     NAMED_FIELDS,
     NEW_PART,
     NO_HEADING,
+    NO_LAST_BAR,
     ONCE,
     ONE_GROUP,
     ORDER,
@@ -206,6 +215,22 @@ def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, 
         f"expected {expected(wanted)}, found {seen}",
         Span(file, position, position + len(word)),
         *([helps] if helps else []),
+    )
+
+
+def _end_of(row: str, there: Span) -> Span:
+    """Return the place of the last character of a row, before what is said aside of it."""
+    end = there.start + len(row.partition("#")[0].rstrip())
+    return Span(there.file, end - 1, end)
+
+
+def _left_out(above: Cell) -> tuple[str, ...]:
+    """Return a help that names what stands above the first cell that a row has not; none where that is empty."""
+    shown = screen.shortened(above.text)
+    return (
+        (f"nothing stands below `{shown}`: a row ends with `|` after its last cell, be it empty",)
+        if shown
+        else ()
     )
 
 
@@ -524,8 +549,12 @@ class _Rows:
         start = _begin(row)
         cells = cut(str(row), start, self.source.name)
         if isinstance(cells, str):
-            there = Span(self.source.name, start, start + len(row.rstrip()))
-            self.diagnostics.append(_error(Code.RAGGED_ROW, cells, there, EMPTY_CELL))
+            whole = Span(self.source.name, start, start + len(row.rstrip()))
+            open_end = cells == NO_LAST_BAR
+            there = _end_of(str(row), whole) if open_end else whole
+            self.diagnostics.append(
+                _error(Code.RAGGED_ROW, cells, there, LAST_BAR if open_end else EMPTY_CELL)
+            )
             return None
         return cells
 
@@ -619,13 +648,15 @@ class _Rows:
             if len(got) != len(want):
                 start = _begin(row)
                 begins = NEW_PART if cells.conditions[0].text == "line" else EMPTY_CELL
-                helps = (begins, PARTED) if len(got) > len(want) else (begins,)
+                cut_short = side == "actions" and len(got) < len(want)
+                more = (PARTED,) if len(got) > len(want) else _left_out(want[len(got)]) if cut_short else ()
                 self.diagnostics.append(
                     _error(
                         Code.RAGGED_ROW,
                         f"this row has {len(got)} cells of {side}, {called} {len(want)}",
                         Span(self.source.name, start, start + len(row.rstrip())),
-                        *helps,
+                        begins,
+                        *more,
                     )
                 )
                 return False
@@ -702,7 +733,8 @@ class _Rows:
             wrong = replace(wrong, primary=Label(tree.absolute(wrong.primary.span, cell)))
             if cell.further:
                 wrong = replace(wrong, help=(*wrong.help, PIECES))
-            self.diagnostics.append(replace(wrong, help=(helps,)) if helps else wrong)
+            kept = not helps or PARTS_CALLS in wrong.help
+            self.diagnostics.append(wrong if kept else replace(wrong, help=(helps,)))
             return None
         if parsed is None:
             self.diagnostics.append(screen.too_deep(self.source, cell.span.start, cell.span.end))

@@ -52,6 +52,8 @@ PIECES = (
 )
 SAME_LINES = "each part of a table has a row for each line, in the same order"
 PLAIN = "how a line stands to others is said where it is named first; further parts of the table repeat its name alone"
+NO_LAST_BAR = "this row does not end with `|`"
+LAST_BAR = "write `|` after its last cell: a row that is cut short is none"
 _Row = TypeVar("_Row", bound=str)
 _Item = TypeVar("_Item")
 
@@ -381,13 +383,15 @@ def joined(cells: Cells, more: Cells, above: Cells) -> Cells | Cell:
 
 
 def cut(row: str, start: int, file: str) -> Cells | str:
-    """Return the cells of `row`, which begins at `start`; a message where `||` does not divide it once."""
+    """Return the cells of `row`, which begins at `start`; a message where `||` does not divide it once, or no bar ends it."""
     row = row.partition("#")[0].rstrip()
     left, bar, right = row.partition("||")
     if not bar:
         return "a row needs `||` between its conditions and its actions"
     if "||" in right:
         return f"a row has exactly one `||`, this one has {row.count('||')}"
+    if not row.endswith("|"):
+        return NO_LAST_BAR
     return Cells(
         _side(left[1:], start + 1, file), _side(right, start + len(left) + 2, file) if right.strip() else ()
     )
