@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.base.diagnostics.source import Source, Span
-from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, TooLarge, content, toml_of
+from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, NotToml, TooLarge, content, toml_of
 
 if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
     from rcsc.lang.syntax import tree
@@ -22,6 +22,8 @@ if TYPE_CHECKING:  # who only looks for the folder of a project, as a running le
 PROJECT_FILE = "rcsc.toml"
 SYSTEM_FILE = "system.toml"
 MOST_BYTES = 16 * 1024 * 1024
+_SETTINGS = ("name", "exclude", "published", "prefix", "starts_at_zero")
+"""Keys of a project's file."""
 PREFIX = re.compile(r"(?:[A-Za-z][A-Za-z0-9_]{0,7})?")
 """Prefixes that the C names of a project may have."""
 
@@ -198,6 +200,20 @@ def used_elsewhere(file: str) -> bool:
     return False
 
 
+def usable(file: str) -> dict[str, str]:
+    """Return the files that a file may `use`, by what it writes: those beside it, and those of its project, whose file says which."""
+    found: dict[str, str] = {}
+    for base in dict.fromkeys((os.path.dirname(file), project_root(file))):
+        files = [str(path) for path in sorted(Path(base or ".").glob("*.rcs"))]
+        if os.path.isfile(os.path.join(base, PROJECT_FILE)):
+            files += listed((base or ".",))
+        for other in files[:_MOST_FILES]:
+            path = os.path.relpath(other, base or ".").removesuffix(".rcs").replace(os.sep, "/")
+            if _USED.fullmatch(path) and os.path.realpath(other) != os.path.realpath(file):
+                found.setdefault(path, other)
+    return found
+
+
 def prefix(root: str) -> str:
     """Return the prefix of a project's C names from its file; "" where it has none, or no valid one.
 
@@ -209,6 +225,24 @@ def prefix(root: str) -> str:
     except (OSError, ValueError, Malformed):
         return ""
     return said if isinstance(said, str) and PREFIX.fullmatch(said) else ""
+
+
+def is_published(file: str) -> bool:
+    """Return whether the project of a file says that it is kept as somebody published it, with its findings."""
+    root = project_root(file)
+    try:
+        said = toml_of(content(Path(root, PROJECT_FILE), MOST_TOML_BYTES))
+    except (OSError, ValueError, Malformed):
+        return False
+    relative = os.path.relpath(file, root).replace(os.sep, "/")
+    return any(fnmatch(relative, pattern) for pattern in _patterns(said, "published") or ())
+
+
+def _patterns(settings: Mapping[str, object], key: str) -> tuple[str, ...] | None:
+    """Return the patterns of files under a key; None where it has something else."""
+    said = settings.get(key, [])
+    texts = [each for each in said if isinstance(each, str)] if isinstance(said, list) else []
+    return tuple(texts) if isinstance(said, list) and len(texts) == len(said) else None
 
 
 def starts_at_zero(root: str) -> bool:
@@ -338,27 +372,30 @@ class _Loader:
         try:
             settings = toml_of(text)
         except Malformed as error:
-            where = _toml_place(str(error), text)
+            where, helps = (error.at, error.helps) if isinstance(error, NotToml) else (0, ())
             message = f"the project file {str(error).partition(' (at ')[0]}"
-            self.report(Code.PROJECT_FILE, message, Span(path, where, where))
+            self.report(Code.PROJECT_FILE, message, Span(path, where, where), *helps)
             return ()
-        patterns = settings.get("exclude", [])
-        unknown = sorted(settings.keys() - {"name", "exclude", "prefix", "starts_at_zero"})
+        unknown = sorted(settings.keys() - set(_SETTINGS))
         wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
         if not isinstance(settings.get("name", ""), str):
             wrong = "`name` is a text"
-        if not isinstance(patterns, list) or not all(isinstance(pattern, str) for pattern in patterns):
-            wrong = "`exclude` is a list of patterns"
+        for key in ("exclude", "published"):
+            if _patterns(settings, key) is None:
+                wrong = f"`{key}` is a list of patterns"
         begins = settings.get("prefix", "")
         if not isinstance(begins, str) or not PREFIX.fullmatch(begins):
             wrong = "`prefix` is a letter, and at most seven letters, digits and `_` after it"
         if not isinstance(settings.get("starts_at_zero", True), bool):
             wrong = "`starts_at_zero` is true or false"
         if wrong:
-            helps = "the settings are `name`, `exclude`, `prefix` and `starts_at_zero`"
-            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), helps)
+            near = _nearest(unknown[0], _SETTINGS) if unknown else ()
+            helps = (
+                f"the settings are {', '.join(f'`{key}`' for key in _SETTINGS[:-1])} and `{_SETTINGS[-1]}`"
+            )
+            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), *near, helps)
             return ()
-        return tuple(patterns)
+        return _patterns(settings, "exclude") or ()
 
     # --- reading ---
 
@@ -419,7 +456,8 @@ class _Loader:
                 return self._name(place)
         places = " and ".join(f"`{place}`" for place in tried)
         message = f"no file `{use.path}.rcs` is found"
-        self.report(Code.FILE_NOT_FOUND, message, use.span, f"looked for {places}")
+        near = _nearest(use.path, sorted(usable(file)))
+        self.report(Code.FILE_NOT_FOUND, message, use.span, *near, f"looked for {places}")
         return None
 
     def _text(self, file: str) -> str | _Unread:
@@ -448,6 +486,12 @@ class _Loader:
             )
 
 
+def _nearest(name: str, known: Sequence[str]) -> tuple[str, ...]:
+    from rcsc.base.host.described import nearest  # keep lazy: a check of what is in order asks for nothing
+
+    return nearest(name, known)
+
+
 def _bytes(file: str) -> bytes | _Unread:
     """Return the content of a regular file of bounded size; a pipe or a device might never end."""
     try:
@@ -465,15 +509,6 @@ def _too_large(file: str) -> _Unread:
     return _Unread(Code.TOO_LARGE, f"`{file}` has more than {MOST_BYTES // 1024**2} MiB", helps)
 
 
-def _toml_place(message: str, text: str) -> int:
-    """Return the offset of a `tomllib` error, which names line and column only in its text."""
-    place = re.search(r"\(at line (\d+), column (\d+)\)", message)
-    if place is None:
-        return len(text) if "end of document" in message else 0
-    before = text.splitlines(keepends=True)[: int(place[1]) - 1]
-    return min(len(text), sum(map(len, before)) + int(place[2]) - 1)
-
-
 # --- who serves and commands whom ---
 
 _ASIDE = re.compile(r"^[ \t]*\|.*|#.*", re.MULTILINE)
@@ -481,6 +516,8 @@ _ASIDE = re.compile(r"^[ \t]*\|.*|#.*", re.MULTILINE)
 _WORD = re.compile(
     r"(?P<before>[:=.,(]?)\s*\b(?:(?P<role>serves|commands)\s+(?P<peer>\w+)\s*:\s*(?P<link>\w+)|use\s+(?P<path>\w+(?:/\w+)*))"
 )
+_USED = re.compile(r"\w+(?:/\w+)*", re.ASCII)
+"""What `use` may name."""
 _MOST_FILES = 1000
 
 

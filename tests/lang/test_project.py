@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.lang.model import Program
-from rcsc.lang.project import MOST_BYTES, listed, load, project_root
+from rcsc.lang.project import MOST_BYTES, is_published, listed, load, project_root
 from rcsc.lang.resolve import resolve
 
 
@@ -239,6 +239,58 @@ def test_a_project_file_that_is_not_right(tmp_path: Path, text: str, start: int)
         assert finding.code.value == "RCS110"
         assert finding.primary.span.file.endswith("rcsc.toml")
         assert text.startswith("a") or finding.primary.span.start == start
+
+
+@pytest.mark.parametrize(
+    ("said", "help_"),
+    [
+        ("name = robot", 'a text stands in quotes: `name = "robot"`'),
+        ("name = my robot # of mine", 'a text stands in quotes: `name = "my robot"`'),
+        ("exclude = [old/b.rcs]", 'a text stands in quotes: `exclude = ["old/b.rcs"`'),
+        ("starts_at_zero = True", "write `starts_at_zero = true`"),
+        ("exclud = []", "did you mean `exclude`?"),
+        ("published = 3", "the settings are `name`, `exclude`, `published`, `prefix` and `starts_at_zero`"),
+    ],
+)
+def test_a_project_file_that_is_nearly_right_is_told_what_to_write(
+    tmp_path: Path, said: str, help_: str
+) -> None:
+    write(tmp_path, a="")
+    (tmp_path / "rcsc.toml").write_text(said)
+    (finding,) = load(["."]).diagnostics
+    assert (finding.code.value, finding.help[0]) == ("RCS110", help_)
+
+
+def test_a_use_that_names_no_file_is_told_what_is_near(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        a="use vocabluary",
+        vocabulary="",
+        sub__a="use sub/wrods\nuse wrods",
+        sub__words="",
+        other__b="use nothing",
+    )
+    (tmp_path / "rcsc.toml").write_text("")
+    found = load(["."]).diagnostics
+    assert [finding.help[0] for finding in found] == [
+        "did you mean `vocabulary`?",
+        "looked for `other/nothing.rcs` and `nothing.rcs`",
+        "did you mean `sub/words`?",
+        "did you mean `words`?",
+    ]
+
+
+def test_published_files_are_those_that_the_project_says(tmp_path: Path) -> None:
+    write(tmp_path, a="", old__published="", sub__old__c="")
+    (tmp_path / "rcsc.toml").write_text('published = ["*published.rcs", "sub/*"]')
+    assert [is_published(each) for each in ("a.rcs", "old/published.rcs", "sub/old/c.rcs")] == [
+        False,
+        True,
+        True,
+    ]
+    assert not codes(".")
+    (tmp_path / "rcsc.toml").write_text("published = 3")
+    assert not is_published("old/published.rcs")
 
 
 def test_the_root_is_the_nearest_folder_with_a_project_file(tmp_path: Path) -> None:

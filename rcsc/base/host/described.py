@@ -5,6 +5,8 @@ as diagnostics. `tomllib` says what the file means but not where; a second scan 
 granted that the text is TOML. Source: TOML 1.0.0 (toml.io), of which only the structure is scanned.
 """
 
+import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -21,6 +23,8 @@ from rcsc.base.host.files.names import MOST_FILE_CHARACTERS, is_file_name, is_id
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 
+_MOST_NAMES = 1000
+"""Names of a folder that are looked at for one that is near."""
 MOST_FAULTS = 100
 """Faults shown of one file; the last says how many more there are."""
 
@@ -169,6 +173,10 @@ Kind: TypeAlias = (
 )
 
 
+_DOTTED_KEY = re.compile(r"[\w-]+(?:\.[\w-]+)+(?=\s*=)")
+"""A key of several parts before a value."""
+
+
 def shown_path(path: KeyPath) -> str:
     """Return a key path as a user would write it; elements of lists count from 1."""
     text = ""
@@ -181,6 +189,17 @@ def nearest(name: str, names: Sequence[str]) -> tuple[str, ...]:
     """Return a help that names the nearest of `names`; none where nothing is near."""
     near = get_close_matches(name, names, n=1, cutoff=0.6)
     return tuple(f"did you mean `{word}`?" for word in near)
+
+
+def near_path(path: Path) -> tuple[str, ...]:
+    """Return a help that names what stands in the folder of a path that is not there, and is called much like it; none where nothing is."""
+    try:
+        names = sorted(os.listdir(path.parent))
+    except (OSError, ValueError):
+        return ()
+    known = [name for name in names[:_MOST_NAMES] if name.isprintable() and name != path.name]
+    before = "" if path.parent == Path() else f"{path.parent}{os.sep}"
+    return tuple(said.replace("`", f"`{before}", 1) for said in nearest(path.name, known))
 
 
 # --- the document ---
@@ -226,10 +245,16 @@ class Document:
         """Note everything that is not as `kind` says in a value that stands at `path`."""
         if not fits(kind, value):
             what = f"`{shown_path(path)}` must be {kind.shown}" if path else f"the file must be {kind.shown}"
-            self.wrong(path, f"{what}, not {_short(value)}")
+            self.wrong(path, f"{what}, not {_short(value)}", *self._dotted(path, value))
             return
         for key, inner, of in self._parts(kind, value, path):
             self.check_part(of, inner, (*path, key))
+
+    def _dotted(self, path: KeyPath, value: object) -> tuple[str, ...]:
+        """Return a help where a key without quotes is taken apart at its dots."""
+        said = self.source.slice(self.span(path)) if isinstance(value, dict) and path else ""
+        key = _DOTTED_KEY.match(said)
+        return () if key is None else (f'a key with a dot stands in quotes: `"{key[0]}" = ...`',)
 
     def holds(self, kind: Record) -> bool:
         """Return whether the keys of a record are there as it declares, whatever else is."""
@@ -341,18 +366,9 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
     try:
         return Document(name, source, read.toml_of(text), code)
     except read.Malformed as problem:
-        at = _decode_place(str(problem), text)
-        fault = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)))
+        at, helps = (problem.at, problem.helps) if isinstance(problem, read.NotToml) else (0, ())
+        fault = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)), help=helps)
         raise error(diagnostics=(fault,), sources={name: source}) from problem
-
-
-def _decode_place(message: str, text: str) -> int:
-    """Return the offset of an error of `tomllib`'s, which names line and column only in words."""
-    words = message.rstrip(")").replace(",", " ").split()
-    if "line" not in words or "column" not in words:
-        return len(text) if "end of document" in message else 0
-    line, column = int(words[words.index("line") + 1]), int(words[words.index("column") + 1])
-    return min(len(text), sum(len(row) + 1 for row in text.split("\n")[: line - 1]) + column - 1)
 
 
 class _Scan:

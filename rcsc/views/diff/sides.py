@@ -12,6 +12,7 @@ from pathlib import Path
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.base.diagnostics.source import Source
 from rcsc.base.host.children import scratch
+from rcsc.base.host.described import near_path
 from rcsc.compose.proof.system import NoProgramError
 from rcsc.compose.together.words import levels_read, system_naming
 from rcsc.lang.leaves import spoken_of
@@ -97,7 +98,8 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     """Load and resolve; the names of files begin with `shown` in place of `hidden`."""
     there = tuple(path for path in paths if os.path.lexists(path))
     if not there and not asked.may_lack:
-        raise NotComparedError(f"there is no file or folder `{asked.name}`")
+        near = () if asked.revision else near_path(Path(asked.name))
+        raise NotComparedError("; ".join((f"there is no file or folder `{asked.name}`", *near)))
     levels = _levels(there)
     instances = {root: instance for root, (_, instance) in levels.items() if instance is not None}
     files = tuple(path for path in there if not _is_system(path))

@@ -47,8 +47,27 @@ UNPRINTED = re.compile(
 """Control characters but tab and ends of lines, overrides of writing direction, and halves of characters."""
 
 
+_UNQUOTED = re.compile(r"[A-Za-z_./][^\x00-\x1f\x7f-\x9f,\]}#\"'=]*")
+"""What may be meant for a text, or for a truth value, where TOML has a value."""
+MOST_ROW = 60
+"""Characters of a row of TOML in a message."""
+
+
 class Malformed(ValueError):  # noqa: N818  # what happened, not an error of ours
     """A text from outside is not what it must be; says why."""
+
+
+class NotToml(Malformed):
+    """A text is not TOML.
+
+    Attributes:
+        at: The offset of the place where it goes wrong.
+        helps: Help texts.
+    """
+
+    def __init__(self, message: str, at: int, *helps: str) -> None:
+        super().__init__(message)
+        self.at, self.helps = at, helps
 
 
 class TooLarge(Malformed):
@@ -216,7 +235,7 @@ def toml_of(document: str | bytes) -> dict[str, Any]:
     """Return the table of a TOML text.
 
     Raises:
-        Malformed: It is no TOML, nested too deep or too large.
+        Malformed: It is nested too deep or too large; `NotToml`: it is no TOML.
     """
     import tomllib
 
@@ -230,9 +249,31 @@ def toml_of(document: str | bytes) -> dict[str, Any]:
     try:
         value = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise Malformed(f"is not TOML: {error}") from error
+        at = _toml_place(str(error), text)
+        raise NotToml(f"is not TOML: {error}", at, *_unquoted(text, at)) from error
     _check_texts(value)
     return value
+
+
+def _toml_place(message: str, text: str) -> int:
+    """Return the offset of an error of `tomllib`'s, which names line and column only in its text."""
+    place = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    if place is None:
+        return len(text) if "end of document" in message else 0
+    before = text.split("\n")[: int(place[1]) - 1]
+    return min(len(text), sum(len(row) + 1 for row in before) + int(place[2]) - 1)
+
+
+def _unquoted(text: str, at: int) -> tuple[str, ...]:
+    """Return a help where a value at a place looks like a text without quotes."""
+    word = _UNQUOTED.match(text, at)
+    if word is None or text[:at].rstrip(" \t")[-1:] not in {"=", ",", "["}:
+        return ()
+    said = word[0].rstrip()
+    value = said.lower() if said.lower() in {"true", "false"} else f'"{said}"'
+    row = text[text.rfind("\n", 0, at) + 1 : at].lstrip()
+    shown = f"{row}{value}" if len(row) + len(value) <= MOST_ROW and row.isprintable() else value
+    return (f"write `{shown}`" if value == said.lower() else f"a text stands in quotes: `{shown}`",)
 
 
 def _bare(match: re.Match[str]) -> str:

@@ -14,8 +14,8 @@ one place ends the command with that (`rcsc.front.commands.group`). A command th
 Nothing here is trusted for a verdict, but for `proved`, which says in words what `rcsc prove` found, and `show`,
 which says what backs each table.
 
-Modules: `options` has the common options, `extras` the packages that the core leaves out, `stopped` how a command ends
-that cannot go on, `systems` what commands about a system need, `graphs` what `rcsc graph` and `rcsc table` do, `logs`
-what `rcsc log` and `rcsc replay` do, `cells`
-makes the paper's cell of a system's data, `show` puts a report out, `proved` says what `rcsc prove` found.
+Modules: `options` has the common options, `paths` the paths that must be there, `extras` the packages that the core leaves
+out, `stopped` how a command ends that cannot go on, `systems` what commands about a system need, `graphs` what `rcsc graph`
+and `rcsc table` do, `logs` what `rcsc log` and `rcsc replay` do, `cells` makes the paper's cell of a system's data, `show`
+puts a report out, `proved` says what `rcsc prove` found.
 """

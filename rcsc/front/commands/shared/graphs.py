@@ -8,6 +8,7 @@ import click
 from rcsc.base.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.base.diagnostics.report import Report
 from rcsc.base.diagnostics.source import Source
+from rcsc.base.host.described import near_path
 from rcsc.base.host.files import write_atomically
 from rcsc.driver.compile import tables_in
 from rcsc.front.commands.shared.options import steps_option
@@ -50,7 +51,7 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     """
     file = named if named.endswith(".rcs") else named.rpartition(":")[0]
     if file.endswith(".rcs") and not Path(file).exists():
-        raise click.UsageError(f"path `{file}` does not exist")
+        raise click.UsageError("; ".join((f"path `{file}` does not exist", *near_path(Path(file)))))
     answer = tables(named, running=running, preferred=() if file else _of_system())
     if isinstance(answer, NotFound):
         raise WrongError(answer.diagnostics, answer.sources)

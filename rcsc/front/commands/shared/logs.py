@@ -11,6 +11,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.report import Report
 from rcsc.base.diagnostics.source import Span
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Output, show
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import NotBuilt
@@ -18,7 +19,7 @@ from rcsc.run.levels import BadState
 from rcsc.run.log.queries import BadCondition
 from rcsc.run.log.read import UnreadableLog
 
-FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE")
+FILE = click.argument("file", type=There(dir_okay=False, path_type=Path), metavar="FILE")
 SHOWN = 12
 """Differences, and restarts, that are shown of one level."""
 

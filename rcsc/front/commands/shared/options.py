@@ -10,15 +10,15 @@ import click
 
 from rcsc.base.host.files.read import standard_input
 from rcsc.driver.settings import CodeWanted, Settings
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Color, Output, OutputForm, Progress
 from rcsc.lang.project import MOST_BYTES
 from rcsc.proof.solvers.options import Options, SolverChoice
 
 Command = Callable[..., int]
 
-PATHS = click.argument(
-    "paths", nargs=-1, type=click.Path(exists=True, readable=False, allow_dash=True), metavar="[PATH]..."
-)
+
+PATHS = click.argument("paths", nargs=-1, type=There(readable=False, allow_dash=True), metavar="[PATH]...")
 """Files, folders, or `-`, which are there; the folder one stands in where none is given."""
 
 
@@ -103,7 +103,7 @@ def looking(command: Command) -> Command:
 
     @click.option(
         "--generated",
-        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        type=There(file_okay=False, path_type=Path),
         default=None,
         metavar="FOLDER",
         help="The folder of the generated C and Python to look at, as `rcsc compile --out` names it; else the one that the system "

@@ -6,8 +6,9 @@ from pathlib import Path
 import click
 
 from rcsc.base.diagnostics.coded import CodedError
-from rcsc.base.host.described import nearest
+from rcsc.base.host.described import near_path, nearest
 from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, text, toml_of
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Output, show
 from rcsc.lang.project import SYSTEM_FILE
 from rcsc.run.description import description
@@ -15,7 +16,7 @@ from rcsc.run.description import description
 PLACES = ("system.toml", "tables/system.toml")
 """Where a folder has its description."""
 SYSTEM = click.option(
-    "--system", "system", type=click.Path(exists=True, path_type=Path), default=None, metavar="SYSTEM",
+    "--system", "system", type=There(path_type=Path), default=None, metavar="SYSTEM",
     help="The system's description, or a folder that has one; else system.toml here or in tables/.",
 )  # fmt: skip
 PLANT = click.option(
@@ -141,7 +142,7 @@ def _is_system(path: Path, *, folder: bool) -> bool:
     if path.suffix != ".toml" or _is_script(path):
         return False
     if not path.exists():
-        raise click.UsageError(f"there is no file `{path}`")
+        raise click.UsageError("; ".join((f"there is no file `{path}`", *near_path(path))))
     return True
 
 
@@ -161,7 +162,9 @@ def _with_script(path: Path, name: str) -> tuple[Path, str]:
     ]
     if Path(name).is_dir():
         raise click.UsageError(f"the folder `{name}` has no system.toml")
-    helps = nearest(name, known) or ((f"those of `{path}` are {', '.join(known)}",) if known else ())
+    helps = nearest(name.removesuffix(".csv"), known) or (
+        (f"those of `{path}` are {', '.join(known)}",) if known else ()
+    )
     raise click.UsageError("; ".join((f"there is no script `{name}`", *helps)))
 
 

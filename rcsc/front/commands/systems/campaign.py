@@ -16,6 +16,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.cache import open_cache
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.options import cores
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Progress, put, writing
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.shared.systems import COMPILES, SYSTEM, made, meant, system_path
@@ -59,7 +60,7 @@ Examples:
 \b
 Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
 )
-@click.argument("target", metavar="[SYSTEM]", required=False, type=click.Path(exists=True, path_type=Path))
+@click.argument("target", metavar="[SYSTEM]", required=False, type=There(path_type=Path))
 @SYSTEM
 @click.option("--plant", "--backend", "plant", default=None, metavar="PLANT",
               help="What stands outside: a file FILE.py or FILE.py:CLASS, or a plant's name in the description; "
@@ -85,7 +86,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
               metavar="SECONDS", help="Most seconds of an episode: one that takes longer counts as hung.")  # fmt: skip
 @click.option("--scheduler", default=None, metavar="ADDRESS",
               help="Play on the workers of this dask.distributed scheduler; they have the same rcsc and tables.")  # fmt: skip
-@click.option("--again", type=click.Path(exists=True, path_type=Path), default=None, metavar="FILE",
+@click.option("--again", type=There(path_type=Path), default=None, metavar="FILE",
               help="Run a saved episode, and nothing else; 1 if a property does not hold.")  # fmt: skip
 @COMPILES
 @click.option("--claims/--no-claims", "claims", default=True, show_default=True,

@@ -12,6 +12,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files import write_atomically
 from rcsc.front.commands.shared.cells import cell_of
 from rcsc.front.commands.shared.logs import FILE, SHOWN, refuse, told
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import writing
 from rcsc.front.commands.shared.stopped import stopped
 from rcsc.front.commands.shared.systems import NoSystem, system_path
@@ -55,7 +56,7 @@ Examples:
 @click.option("-o", "--output", type=_TO, default=None, metavar="PICTURE", help="Where: .svg, .png or .pdf.")
 @click.option("--report", type=_TO, default=None, metavar="PAGE",
               help="Write a page about the run; of a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
-@click.option("--system", type=click.Path(exists=True, path_type=Path), default=None, metavar="SYSTEM",
+@click.option("--system", type=There(path_type=Path), default=None, metavar="SYSTEM",
               help="For --report: the system whose cell is drawn; else system.toml here or in tables/, if it is the log's.")  # fmt: skip
 @told
 def command(  # noqa: PLR0913  # as many as there are options

@@ -23,6 +23,7 @@ from rcsc.base.host.files.read import Malformed, lines_of, standard_input, text,
 from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.commands import Commands, said
 from rcsc.desk.shell.opening import Opening, opened
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.stopped import attach
 from rcsc.front.commands.shared.systems import ATTACH, COMPILES, EXECUTOR, PLANT, made, system_path
 from rcsc.run.orders.script import BadScript
@@ -54,7 +55,7 @@ In the shell:
   run until task.cur_state = state_3
   help""",
 )
-@click.option("--script", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+@click.option("--script", type=There(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
 @EXECUTOR
 @PLANT
@@ -62,7 +63,7 @@ In the shell:
 @ATTACH
 @click.option("--alone", is_flag=True,
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
-@click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
+@click.argument("system", required=False, type=There(path_type=Path), metavar="[SYSTEM]")
 def command(
     script: Path | None, executor: str, plant: str | None, compiles: bool, attached: str | None, alone: bool, system: Path | None
 ) -> int:  # fmt: skip

@@ -11,6 +11,7 @@ from rcsc.base.host.guard import door
 from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.systems import ATTACH, EXECUTOR, PLANT, SYSTEM, meant, tables_meant
 from rcsc.lang.project import project_root
 from rcsc.run.description import description
@@ -43,7 +44,7 @@ Examples:
               help="Nothing outside the levels, and no database: what comes in is set by hand.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Seed of the plant's random numbers.")  # fmt: skip
-@click.option("--log", "logs", multiple=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE",
+@click.option("--log", "logs", multiple=True, type=There(dir_okay=False, path_type=Path), metavar="FILE",
               help="A log to look at, wherever it lies (repeatable); the first is shown at once.")  # fmt: skip
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Where to listen; else a free one."

@@ -18,6 +18,7 @@ from rcsc.driver.pipeline import proved, read
 from rcsc.driver.settings import Conclusion, Settings
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.options import proving, settings_of, showing
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Output, finish
 from rcsc.front.commands.systems.prove import command as prove
 from rcsc.lang.model import Program, ProvedProgram
@@ -41,10 +42,10 @@ Examples:
   rcsc certify acquire.rcs --certify          have cvc5 answer what the checker leaves
   rcsc certify tables/system.toml             the levels together, again by cvc5""",
 )
-@click.argument("source", metavar="FILE", type=click.Path(exists=True, dir_okay=False))
+@click.argument("source", metavar="FILE", type=There(dir_okay=False))
 @click.option("--write", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="CERTIFICATE",
               help="Keep the certificate in this file.")  # fmt: skip
-@click.option("--against", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None,
+@click.option("--against", type=There(dir_okay=False, path_type=Path), default=None,
               metavar="CERTIFICATE", help="Check this certificate instead of making one.")  # fmt: skip
 @click.option("--certify", "cvc5", is_flag=True,
               help="Put what the checker does not settle by itself to cvc5, which has no part in the proof.")  # fmt: skip

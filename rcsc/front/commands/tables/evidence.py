@@ -7,6 +7,7 @@ import click
 from rcsc.base.host.files.read import Malformed, plain
 from rcsc.driver.settings import CodeWanted
 from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Output, finish
 from rcsc.proof.solvers.options import Options
 from rcsc.views.evidence.collect import KINDS, collect
@@ -35,7 +36,7 @@ Examples:
               show_default=True, help="Where the files go: FOLDER/PROGRAM/KIND, with an index.")  # fmt: skip
 @click.option("--by", default=user, show_default="the user's name", envvar="RCSC_BY", metavar="NAME",
               help="Who makes the evidence, for its index; else as RCSC_BY says.")  # fmt: skip
-@click.option("--check", "checked", type=click.Path(exists=True, file_okay=False, path_type=Path), default=None, metavar="FOLDER",
+@click.option("--check", "checked", type=There(file_okay=False, path_type=Path), default=None, metavar="FOLDER",
               help="Make nothing: hold a dossier against this checkout; run it where the dossier was made.")  # fmt: skip
 @looking
 @proving

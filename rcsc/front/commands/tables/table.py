@@ -9,6 +9,7 @@ from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Source, Span
 from rcsc.base.host.files.read import Malformed, content, decoded, piped, plain, standard_input
 from rcsc.front.commands.shared.graphs import ENDINGS, OUT, STEPS, WrongError, found_tables, written
+from rcsc.front.commands.shared.paths import There
 from rcsc.lang.project import load
 from rcsc.proof.solvers.options import Options
 from rcsc.views.graph.formats.choice import FORMS, form_of
@@ -25,12 +26,12 @@ Examples:
   rcsc table acquire.mmd --against tables/task/acquire.rcs  and prove that it does the same as that one
   rcsc table m.scxml --in tables/task/move.rcs -o new.rcs   the file, with this table in place of its own""",
 )
-@click.argument("drawn", metavar="GRAPH", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
+@click.argument("drawn", metavar="GRAPH", type=There(dir_okay=False, allow_dash=True))
 @click.option("--form", type=click.Choice([ending for ending in ENDINGS if ending != "svg"]), default=None,
               help="dot, mermaid or scxml; else by how the text begins.")  # fmt: skip
 @click.option("--against", "other", default=None, metavar="TABLE",
               help="Prove that the graph does what this table does (a name, FILE or FILE:NAME); else 1, and an input.")  # fmt: skip
-@click.option("--in", "place", type=click.Path(exists=True, dir_okay=False), default=None, metavar="FILE",
+@click.option("--in", "place", type=There(dir_okay=False), default=None, metavar="FILE",
               help="Write all of FILE.rcs, with the table in place of the one of its name.")  # fmt: skip
 @OUT
 @STEPS

@@ -11,12 +11,13 @@ from rcsc.base.host.files.read import Malformed
 from rcsc.code.emit.generated import written
 from rcsc.driver.settings import CodeWanted
 from rcsc.front.commands.shared.options import PATHS, looking, proving, settings_of, showing
+from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Output, finish, put
 from rcsc.proof.solvers.options import Options
 from rcsc.views.trace.answer import answer, suggestions
 from rcsc.views.trace.collect import Traced, Wanted, trace
 
-_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+_FILE = There(dir_okay=False, path_type=Path)
 
 
 @click.command(

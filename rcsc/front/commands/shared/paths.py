@@ -1,0 +1,23 @@
+"""Paths that must be there; of one that is not, the message names what is near."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+class There(click.Path):
+    """A path that is there; of one that is not, the message names what is near."""
+
+    def __init__(self, **kinds: Any) -> None:
+        super().__init__(exists=True, **kinds)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path; say which is near where it is not there."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            from rcsc.base.host.described import near_path  # keep lazy: most paths are there
+
+            error.message = "; ".join((error.message.removesuffix("."), *near_path(Path(value))))
+            raise
