@@ -23,6 +23,7 @@ Trusted: that only what was proved is emitted, which the types say (`lower` take
 (`rcsc.base.host`).
 
 Modules, in the order the data flows: `settings` (what commands are given and hand back), `unchanged` (a whole check remembered), `proofs`
-(of one program), `pipeline` (read, resolve, prove), `outline` and `together` (what earlier proofs of the levels say), `requirements` (how
-all that is required stands), `watched` (what was proved, for `rcsc campaign`); then `check`, `compile` and `trials` (`rcsc test`).
+(of one program), `missing` (what is told once of names that nothing declares), `pipeline` (read, resolve, prove), `outline` and `together`
+(what earlier proofs of the levels say), `requirements` (how all that is required stands), `watched` (what was proved, for `rcsc campaign`);
+then `check`, `compile` and `trials` (`rcsc test`).
 """

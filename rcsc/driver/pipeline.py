@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.base.diagnostics.report import Report, merged
 from rcsc.base.diagnostics.source import Source
@@ -99,12 +100,16 @@ def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterat
 
 
 def _across(root: str, loaded: Loaded, found: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """Return what is wrong with a file that is no program: less, where it states requirements across the levels of a system."""
-    if not any(isinstance(each, RequirementDecl | PropertyDecl) for each in _declared(root, loaded)):
-        return found
-    from rcsc.compose.together.words import told_across  # keep lazy: few files state such
+    """Return what is wrong with a file that is no program: less, where it states requirements across levels, or a name is unknown."""
+    if any(isinstance(each, RequirementDecl | PropertyDecl) for each in _declared(root, loaded)):
+        from rcsc.compose.together.words import told_across  # keep lazy: few files state such
 
-    return told_across(root, loaded, found)
+        found = told_across(root, loaded, found)
+    if any(each.code is Code.UNKNOWN_NAME for each in found):
+        from rcsc.driver.missing import told  # keep lazy: most files name what is declared
+
+        found = told(root, loaded, found)
+    return found
 
 
 def _declared(root: str, loaded: Loaded) -> tuple[Declaration, ...]:

@@ -19,7 +19,7 @@ from rcsc.base.host.files.read import Malformed, content
 from rcsc.lang.project import MOST_BYTES, Loaded, listed, places
 from rcsc.proof.solvers.options import Options
 
-_PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
+_PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE, Code.UNKNOWN_NAME}
 """Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""
 
 

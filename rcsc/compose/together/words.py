@@ -4,13 +4,15 @@ In: a system's description and the programs of its levels. Out: the program of t
 """
 
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
 from rcsc.base.diagnostics.diagnostic import Diagnostic
-from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, content, toml_of
+from rcsc.base.host.files.read import MOST_TOML_BYTES, Malformed, NotToml, content, text, toml_of
 from rcsc.compose.proof.system import NoProgramError, loaded_program
 from rcsc.lang.model import Program
 from rcsc.lang.project import Loaded, systems_above
@@ -84,9 +86,26 @@ def told_across(root: str, loaded: Loaded, otherwise: Sequence[Diagnostic]) -> t
     """
     path = system_naming(root)
     if path is None:
-        return tuple(otherwise)
+        return _unread_naming(root) or tuple(otherwise)
     try:
         found = levels_read(path).means(root, loaded)
     except (BadDescription, NoProgramError):
         return ()
     return () if isinstance(found, Program) else found
+
+
+def _unread_naming(root: str) -> tuple[Diagnostic, ...]:
+    """Return what is wrong with a description that is no TOML and seems to name a file; none where there is no such."""
+    for path in systems_above(root):
+        with suppress(OSError, Malformed):
+            said = text(path, MOST_TOML_BYTES)
+            if re.search(rf"(?m)^\s*requirements\s*=.*\b{re.escape(os.path.basename(root))}", said) is None:
+                continue
+            try:
+                toml_of(said)
+            except NotToml:
+                try:
+                    description(Path(os.path.relpath(path)))  # as a path that was given
+                except BadDescription as error:
+                    return error.diagnostics
+    return ()
