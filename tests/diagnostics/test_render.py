@@ -171,6 +171,34 @@ def test_any_span_of_any_text_renders(text: str, start: int, length: int, messag
     assert annotation(found, sources).count("\n") == 0
 
 
+SENTENCES = st.lists(st.text("ab`é状", min_size=1, max_size=9), min_size=1, max_size=40).map(" ".join)
+
+
+@given(SENTENCES, SENTENCES, st.sampled_from([40, 80, 120]))
+def test_sentences_are_broken_between_words_and_lose_none(message: str, help_: str, columns: int) -> None:
+    found = Diagnostic(Code.SYNTAX, message, Label(Span("f", 0, 1)), help=(help_,))
+    rows = full(found, {"f": Source("f", "x" * 200)}, columns, broken=True)
+    lines = plain(rows).splitlines()
+    assert all(width(line) <= columns for line in lines)
+    at = next(at for at, line in enumerate(lines) if line.startswith(" --> "))
+    told = (lines[:at], lines[next(at for at, line in enumerate(lines) if line.startswith("  = help")) :])
+    for said, shown in zip((message, help_), told, strict=True):
+        assert " ".join(shown).split()[-len(said.split()) :] == said.split()
+    assert (
+        plain(full(found, {}, columns)).count("\n") == 3
+    )  # as long as they are, where nothing asks for a width
+
+
+def test_a_word_that_is_too_long_stands_alone() -> None:
+    long = "a" * 60
+    found = Diagnostic(Code.SYNTAX, f"one {long} two", Label(Span("f", 0, 1)))
+    assert plain(full(found, {}, 40, broken=True)).splitlines()[:3] == [
+        "error[RCS101]: one",
+        f"{' ' * 15}{long}",
+        f"{' ' * 15}two",
+    ]
+
+
 # --- JSON ----------------------------------------------------------------------------
 
 REPORT = Report(

@@ -45,26 +45,79 @@ class TextPiece:
 Row = tuple[TextPiece, ...]
 
 
-def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -> tuple[Row, ...]:
-    """Return the diagnostic with its source, witnesses, notes and help, at most about `columns` wide."""
+def full(
+    diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE, *, broken: bool = False
+) -> tuple[Row, ...]:
+    """Return the diagnostic with its source, witnesses, notes and help.
+
+    Excerpts are at most about `columns` wide, and so are sentences that are to be `broken` between words.
+    """
+    rows: list[Row] = []
+    for row, hang in _full(diagnostic, sources, columns):
+        rows += wrapped(row, columns, hang) if broken and hang else [row]
+    return tuple(rows)
+
+
+def wrapped(row: Row, columns: int, hang: int) -> Iterator[Row]:
+    r"""Yield a row broken between words so that none is wider than `columns`, but for longer words; all after the first begin at `hang`.
+
+    >>> row = (TextPiece("help", Style.HELP), TextPiece(": write `:=` instead"))
+    >>> [plain([part]) for part in wrapped(row, 16, 6)]
+    ['help: write `:=`\n', '      instead\n']
+    """
+    text = "".join(piece.text for piece in row)
+    start, shift = 0, 0
+    while True:
+        end = _line_end(text, start, columns - shift, 0 if start else min(hang, len(text)))
+        yield (*((TextPiece(" " * shift),) if shift else ()), *_cut(row, start, end))
+        rest = text[end:].lstrip(" \n")
+        if not rest:
+            return
+        start, shift = len(text) - len(rest), min(hang, columns // 2)
+
+
+def _line_end(text: str, start: int, room: int, past: int) -> int:
+    """Return where a line from `start` ends: at a newline, before the word that no longer fits, or after the first if that is too long."""
+    stop = text.find("\n", start)
+    stop = len(text) if stop < 0 else stop
+    if width(text[start:stop]) <= room:
+        return stop
+    end = -1
+    for at in range(start + past, stop):
+        if text[at] == " " and (end < 0 or width(text[start:at]) <= room):
+            end = at
+    return stop if end < 0 else end
+
+
+def _cut(row: Row, start: int, end: int) -> Row:
+    """Return the pieces of a row from one character to another."""
+    pieces, at = [], 0
+    for piece in row:
+        part = piece.text[max(0, start - at) : max(0, end - at)]
+        pieces += [TextPiece(part, piece.style)] if part else []
+        at += len(piece.text)
+    return tuple(pieces)
+
+
+def _full(diagnostic: Diagnostic, sources: Sources, columns: int) -> Iterator[tuple[Row, int]]:
+    """Yield the rows, each with the cell at which it goes on where it is broken; 0 for one that is not."""
     style = OF_SEVERITY[diagnostic.severity]
-    rows: list[Row] = [
-        (
-            TextPiece(f"{diagnostic.severity.value}[{diagnostic.code.value}]", style),
-            TextPiece(f": {escape(diagnostic.message)}", Style.STRONG),
-        )
-    ]
+    head = f"{diagnostic.severity.value}[{diagnostic.code.value}]"
+    yield (TextPiece(head, style), TextPiece(f": {escape(diagnostic.message)}", Style.STRONG)), len(head) + 2
     labels = (diagnostic.primary, *diagnostic.related)
     gutter = max(len(str(_line_number(label, sources))) for label in labels)
-    rows += _snippets(diagnostic, sources, gutter, columns, style)
+    yield from ((row, 0) for row in _snippets(diagnostic, sources, gutter, columns, style))
     for witness in diagnostic.shown:
-        whole = diagnostic.severity is not Severity.NOTE or not witness.region
-        rows += _witness(witness, gutter) if whole else (_region(witness, gutter),)
+        if diagnostic.severity is not Severity.NOTE or not witness.region:
+            yield from ((row, 0) for row in _witness(witness, gutter))
+        if witness.region:
+            yield _attached(gutter, "region", region(witness), Style.WITNESS), gutter + 11
     if diagnostic.left_out:
-        rows.append(_attached(gutter, "more", f"and {diagnostic.left_out}", Style.NOTE))
-    rows += [_attached(gutter, "note", note, Style.NOTE) for note in diagnostic.notes]
-    rows += [_attached(gutter, "help", text, Style.HELP) for text in diagnostic.help]
-    return tuple(rows)
+        yield _attached(gutter, "more", f"and {diagnostic.left_out}", Style.NOTE), gutter + 9
+    for note in diagnostic.notes:
+        yield _attached(gutter, "note", note, Style.NOTE), gutter + 9
+    for text in diagnostic.help:
+        yield _attached(gutter, "help", text, Style.HELP), gutter + 9
 
 
 def one_line(diagnostic: Diagnostic, sources: Sources) -> str:
@@ -234,12 +287,6 @@ def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
             TextPiece(" " + _joined(row[2:], widths[2:]) if row[2:] else " |"),
         )
     yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
-    if witness.region:
-        yield _region(witness, gutter)
-
-
-def _region(witness: WitnessColumn, gutter: int) -> Row:
-    return _attached(gutter, "region", region(witness), Style.WITNESS)
 
 
 def region(witness: WitnessColumn) -> str:
