@@ -14,7 +14,7 @@ from rcsc.base.host.cache import Cache, open_cache
 from rcsc.base.host.files.read import Malformed, content
 from rcsc.driver.settings import Settings
 from rcsc.driver.unchanged import recall, remember
-from rcsc.lang.project import project_root, systems_above, used_elsewhere
+from rcsc.lang.project import is_published, project_root, systems_above, used_elsewhere
 
 _UNREAD = frozenset((Code.UNREAD, Code.UNUSED_CONSTANT, Code.UNUSED_MEMBER))
 _WORD = re.compile(r"\w+")
@@ -22,6 +22,12 @@ _WORD = re.compile(r"\w+")
 
 def check(settings: Settings) -> Report:
     """Prove every table; for those that a system's levels run, tell what the proof of the levels together shows."""
+    found = _together(settings)
+    files = dict.fromkeys(each.primary.span.file for each in found.diagnostics)
+    return replace(found, published=tuple(filter(is_published, files)))
+
+
+def _together(settings: Settings) -> Report:
     cache = _cache(settings)
     report = _staying_outside(_unread_elsewhere(_checked(settings, cache)))
     if cache is None or not any(systems_above(table.file) for table in report.tables):

@@ -84,7 +84,8 @@ class Code(StrEnum):
     RAGGED_ROW = """RCS102: a row has another number of cells than the heading
 
     Every row of a table has a cell for each heading, with one `||` between conditions and actions. Leave a cell blank rather than out:
-    a blank condition is don't care, a blank action does nothing.
+    a blank condition is don't care, a blank action does nothing. A row ends with `|`: one that is cut short is refused, as nobody knows
+    what it was to say.
 
         input ready : bool
         output go : bool
@@ -166,8 +167,8 @@ class Code(StrEnum):
     """
     PROJECT_FILE = """RCS110: the project file is not right
 
-    `rcsc.toml` marks the root of a project. It may say `name = "..."` and `exclude = ["glob", ...]`, and nothing else. The message says
-    what is wrong with it.
+    `rcsc.toml` marks the root of a project. It may say `name`, `exclude`, `published`, `prefix` and `starts_at_zero`, and nothing else: the
+    manual has a row for each. The message says what is wrong with it; a text stands in quotes, a list of texts in `[]`.
     """
     NO_TABLES = """RCS111: there is nothing to check
 
@@ -249,6 +250,8 @@ class Code(StrEnum):
     UNKNOWN_NAME = """RCS201: an unknown name
 
     Nothing of this name is declared in this file or in the files it uses. Where a declared name is much alike, the message's help names it.
+    Where another file of the project declares it, and `use` would find that file, the help is the line to write; what follows from the same
+    missing line is not told again. What several levels do together is claimed in a file of the system, not of one level.
 
         input ready : bool
         output go : bool

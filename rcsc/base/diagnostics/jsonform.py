@@ -32,6 +32,10 @@ def report_to_json(report: Report, command: str) -> Json:
         "diagnostics": [diagnostic_to_json(diagnostic, report.sources) for diagnostic in report.diagnostics],
         "tables": [table_to_json(table) for table in report.tables],
         "systems": [_listed(system) for system in report.systems],
+        "published": {
+            "files": list(report.published),
+            "counts": {f"{each.value}s": report.count(each, published=True) for each in Severity},
+        },
     }
 
 

@@ -181,16 +181,25 @@ class Report:
         tables: In order of file and place.
         sources: Every text that a diagnostic points into.
         systems: Those that the tables belong to, as far as they were looked at.
+        published: Files with a finding that their project keeps as somebody published them; their findings are told apart.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     tables: tuple[TableReport, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     systems: tuple[SystemReport, ...] = ()
+    published: tuple[str, ...] = ()
 
-    def count(self, severity: Severity) -> int:
-        """Count the diagnostics of this severity."""
-        return sum(diagnostic.severity is severity for diagnostic in self.diagnostics)
+    def count(self, severity: Severity, *, published: bool | None = None) -> int:
+        """Count the diagnostics of this severity: all, or those in published files, or those elsewhere."""
+        return sum(
+            each.severity is severity and published in (None, self.is_published(each))
+            for each in self.diagnostics
+        )
+
+    def is_published(self, diagnostic: Diagnostic) -> bool:
+        """Return whether a diagnostic is of a published file."""
+        return diagnostic.primary.span.file in self.published
 
     @property
     def failed(self) -> bool:

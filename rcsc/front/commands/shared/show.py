@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -27,6 +28,7 @@ from rcsc.base.diagnostics.render import (
     one_line,
     paint,
     plain,
+    wrapped,
 )
 from rcsc.base.diagnostics.report import (
     NOT_PROVED,
@@ -84,6 +86,12 @@ _OF_VERDICT = {
     Verdict.REFUTED: Style.ERROR,
     Verdict.UNDECIDED: Style.WARNING,
 }
+_SPACED = re.compile(r" *[^ ]+| +$")
+"""A word and the blanks before it."""
+_KEPT = "In files that are kept as published:"
+"""Before the findings of published files."""
+_NARROWEST = 40
+"""Columns to which sentences are broken in a narrower terminal, too."""
 _REPEATED = {Code.DEFAULT_COVERS, Code.GIVES_WAY, Code.PROPERTY_ELSEWHERE}
 """What is right, and said again by every check."""
 
@@ -160,15 +168,54 @@ def _told(report: Report, output: Output) -> Iterator[Diagnostic]:
 
 def _text(report: Report, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
-    columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else WIDEST_LINE
+    columns = terminal_columns() if output.file is None else None
+    broken, columns = columns is not None, columns or WIDEST_LINE
     rows: list[Row] = []
-    for diagnostic in (each for each in _told(report, output) if not each.told_with):
-        rows += (*full(diagnostic, report.sources, columns), ())
+    shown = [each for each in _told(report, output) if not each.told_with]
+    for published in (False, True):
+        these = [each for each in shown if report.is_published(each) is published]
+        if published and these and not output.quiet:
+            rows += ((TextPiece(_KEPT, Style.STRONG),), ())
+        for diagnostic in these:
+            rows += (*full(diagnostic, report.sources, columns, broken=broken), ())
     if not output.quiet:
-        rows += summary(report)
-        if closing:
-            rows.append((TextPiece(closing, Style.STRONG),))
+        ending = [*summary(report), *([(TextPiece(closing, Style.STRONG),)] if closing else [])]
+        rows += [part for row in ending for part in wrapped(row, columns, 4)] if broken else ending
     return paint(rows) if coloured else plain(rows)
+
+
+def terminal_columns(handle: int = 1) -> int | None:
+    """Return the width of the terminal that standard output is, or another handle, which `COLUMNS` overrides; None where it is none."""
+    if not _is_terminal(handle):
+        return None
+    told = os.environ.get("COLUMNS", "")
+    columns = int(told) if told.isdecimal() and len(told) < 6 else 0
+    return max(_NARROWEST, columns or os.get_terminal_size(handle).columns or WIDEST_LINE)
+
+
+def say(line: str, *, err: bool = False) -> None:
+    """Print a line of a report; on a terminal it is broken between words, and goes on further to the right. JSON stays as it is."""
+    columns = terminal_columns(2 if err else 1)
+    whole = columns is None or line.startswith("{")
+    click.echo(line if whole or columns is None else in_columns(line, columns), err=err)
+
+
+def in_columns(line: str, columns: int) -> str:
+    r"""Return a line broken between words so that none is wider than `columns`, but for longer words; colours take no room.
+
+    >>> in_columns("  given that nothing is refused for ever", 24)
+    '  given that nothing is\n      refused for ever'
+    """
+    words = _SPACED.findall(line)
+    indent = " " * min(len(line) - len(line.lstrip(" ")) + 4, columns // 2)
+    told, room = "", columns
+    for word in words:
+        wide = width(click.unstyle(word))
+        if told and wide > room:
+            told, room, word = f"{told.rstrip(' ')}\n{indent}", columns - len(indent), word.lstrip(" ")  # noqa: PLW2901
+            wide = width(click.unstyle(word))
+        told, room = told + word, room - wide
+    return told
 
 
 def _is_terminal(handle: int) -> bool:
@@ -194,7 +241,8 @@ def summary(report: Report) -> Iterator[Row]:
     names = max((width(escape(table.table)) for table in report.tables), default=0)
     words = max((9, *(len(table.verdict.value) for table in report.tables)))
     for file, tables in groupby(report.tables, key=lambda table: table.file):
-        yield (TextPiece(escape(file), Style.STRONG),)
+        kept = (TextPiece("  kept as published"),) if file in report.published else ()
+        yield (TextPiece(escape(file), Style.STRONG), *kept)
         for table in tables:
             yield (
                 TextPiece(f"  {pad(escape(table.table), names)}  "),
@@ -260,8 +308,16 @@ def _together(known: InSystem) -> Iterator[str]:
 def _counts(report: Report) -> Iterator[TextPiece]:
     if report.tables:
         yield from _verdicts(report)
+    yield from _by_severity(report, published=False)
+    if report.published:
+        many = len(report.published)
+        yield TextPiece(f"; in {many} published file{'' if many == 1 else 's'} ")
+        yield from _by_severity(report, published=True)
+
+
+def _by_severity(report: Report, *, published: bool) -> Iterator[TextPiece]:
     for number, severity in enumerate(Severity):
-        count = report.count(severity)
+        count = report.count(severity, published=published)
         noun = severity.value if count == 1 else f"{severity.value}s"
         yield TextPiece(", " if number else "")
         yield TextPiece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)

@@ -11,7 +11,8 @@ import click
 
 from rcsc.base.diagnostics.coded import CodedError
 from rcsc.base.diagnostics.codes import Code
-from rcsc.base.diagnostics.render import full, plain
+from rcsc.base.diagnostics.render import WIDEST_LINE, full, plain
+from rcsc.front.commands.shared.show import say, terminal_columns
 
 if TYPE_CHECKING:
     from rcsc.base.host.described import BadFile
@@ -21,12 +22,12 @@ _P = ParamSpec("_P")
 
 def say_error(code: Code, text: str, severity: str = "error") -> None:
     """Print a finding of one line on standard error."""
-    click.echo(f"{severity}[{code.value}]: {text}", err=True)
+    say(f"{severity}[{code.value}]: {text}", err=True)
 
 
 def attach(word: str, text: object) -> None:
     """Print a line that belongs to the finding above: a `note`, a `help`, a `log`."""
-    click.echo(f"  = {word}: {text}", err=True)
+    say(f"  = {word}: {text}", err=True)
 
 
 class Stopped(click.ClickException):  # what happened
@@ -55,8 +56,10 @@ class StoppedByFile(Stopped):
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
         """Print each error, with its line in the file."""
+        columns = terminal_columns(2)
         for diagnostic in self.diagnostics:
-            click.echo(plain(full(diagnostic, self.sources)), err=True)
+            rows = full(diagnostic, self.sources, columns or WIDEST_LINE, broken=columns is not None)
+            click.echo(plain(rows), err=True)
 
 
 class Interrupted(Stopped):

@@ -12,6 +12,8 @@ from rcsc.base.host.cache import open_cache
 from rcsc.driver.outline import recall_lines
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.options import steps_option
+from rcsc.front.commands.shared.paths import There
+from rcsc.front.commands.shared.show import say
 from rcsc.front.commands.shared.systems import system_path
 
 
@@ -31,7 +33,7 @@ Examples:
   rcsc prove --where "stock = 0"               traces that begin with an empty stock
   rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
-@click.argument("system", required=False, type=click.Path(exists=True, path_type=Path), metavar="[SYSTEM]")
+@click.argument("system", required=False, type=There(path_type=Path), metavar="[SYSTEM]")
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
 @click.option("--requirement", "required", multiple=True, metavar="NAME",
               help="Of the requirements across levels, answer only this one (repeatable).")  # fmt: skip
@@ -49,7 +51,7 @@ Examples:
               help="Keep each trace in DIR as a log that `rcsc replay` steps and `rcsc log` draws, with its executors.")  # fmt: skip
 @click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
               help="Keep each trace in DIR as a case for --case: a test that fails until the tables are mended.")  # fmt: skip
-@click.option("--case", "cases", multiple=True, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE",
+@click.option("--case", "cases", multiple=True, type=There(dir_okay=False, path_type=Path), metavar="FILE",
               help="Run a frozen case on the tables as they are, and nothing else (repeatable).")  # fmt: skip
 @click.option("--without-deferral", is_flag=True,
               help="As if every next state were taken at once, not when its command is echoed: a demonstration.")  # fmt: skip
@@ -121,7 +123,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         known = recall_lines(cache, path, key)
         if known is not None:
             for line in known:
-                click.echo(line)
+                say(line)
             return 0
     from rcsc.front.commands.systems.proving import (  # what is known is printed without
         Asked,

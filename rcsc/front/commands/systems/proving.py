@@ -61,7 +61,7 @@ from rcsc.front.commands.shared.proved import (
     trusted,
     trusting,
 )
-from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, wants_color
+from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, say, wants_color
 from rcsc.front.commands.shared.stopped import say_error
 from rcsc.front.commands.systems import across
 from rcsc.front.commands.systems.covering import coverage_as_json, lines_of
@@ -338,7 +338,7 @@ def _known(only: tuple[str, ...], systems: Mapping[str, TransitionSystem]) -> tu
 
 def _say(lines: Iterable[str]) -> None:
     for line in lines:
-        click.echo(line)
+        say(line)
 
 
 def _recalled(proof: SystemProof) -> SystemProof:
