@@ -390,10 +390,9 @@ class _Loader:
             wrong = "`starts_at_zero` is true or false"
         if wrong:
             near = _nearest(unknown[0], _SETTINGS) if unknown else ()
-            helps = (
-                f"the settings are {', '.join(f'`{key}`' for key in _SETTINGS[:-1])} and `{_SETTINGS[-1]}`"
-            )
-            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), *near, helps)
+            *most, last = _SETTINGS
+            known = f"the settings are {', '.join(f'`{key}`' for key in most)} and `{last}`"
+            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), *near, known)
             return ()
         return _patterns(settings, "exclude") or ()
 

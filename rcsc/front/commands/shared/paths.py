@@ -19,5 +19,6 @@ class There(click.Path):
         except click.BadParameter as error:
             from rcsc.base.host.described import near_path  # keep lazy: most paths are there
 
-            error.message = "; ".join((error.message.removesuffix("."), *near_path(Path(value))))
-            raise
+            told = (error.message.removesuffix("."), *near_path(Path(value)))
+            message = "; ".join(told) if len(told) > 1 else error.message
+            raise click.BadParameter(message, error.ctx, error.param) from error
