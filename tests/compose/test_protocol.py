@@ -164,7 +164,10 @@ def test_a_level_by_hand_takes_no_answer_back(
     shutil.copytree(
         DOCK.parent / "dock", tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache")
     )
-    edit_file(tmp_path / "drive.rcs", (line, line.replace(*status)))
+    drive = tmp_path / "drive.rcs"
+    text = drive.read_text(encoding="utf-8")
+    assert text.index(line) > text.index("table goto")
+    drive.write_text(text.replace(line, line.replace(*status), 1), encoding="utf-8")  # of its first table
     ts = transition_systems(tmp_path / "system.toml")["drive"]
     proof = prove_level(ts, LITTLE)
     assert [one.sort for one in proof.open] == left

@@ -15,8 +15,20 @@ pytestmark = pytest.mark.needs("chromium")
 EXAMPLES = Path(__file__).parents[2] / "tables" / "examples"
 PANES = "[...document.querySelectorAll('.pane')].map((pane) => [pane.hidden, [...pane.children].map(({ dataset }) => dataset.view)])"
 CELLS = "[...document.querySelectorAll('.sheet td[data-column=\"{}\"]')].map((cell) => cell.innerText.trim())"
-DEAF = "window.WebSocket = class extends EventTarget { static OPEN = 1; };"
-"""A machine on which the studio does not answer yet."""
+SLOW = """window.WebSocket = class extends EventTarget {
+  static OPEN = 1;
+  readyState = 1;
+  constructor() {
+    super();
+    setTimeout(() => {
+      this.dispatchEvent(new Event("open"));
+      const said = { event: "build.state", body: { doing: "", asks: "", system: true } };
+      this.dispatchEvent(new MessageEvent("message", { data: JSON.stringify(said) }));
+    });
+  }
+  send() {}
+};"""
+"""A studio that has said that there is a system, and not yet what it does."""
 
 
 @pytest.fixture
@@ -105,10 +117,11 @@ def test_what_is_pressed_before_a_table_is_found_wrong_runs_nothing_later(tmp_pa
 
 def test_the_first_picture_claims_nothing_of_a_system_that_it_does_not_know_yet(docks: Path) -> None:
     with seated(Opening(docks)) as seat:
-        seat.begin_with(DEAF)
+        seat.begin_with(SLOW)
         seat.reload()
         seat.wait("document.documentElement.dataset.ready === 'yes'")
-        assert seat.reads("#state") == "connecting"
+        seat.until(".view-run .closed", "Connecting")
+        assert "not connected" not in seat.reads("#panes")
         assert "No system runs" not in seat.reads("#panes")
 
 
