@@ -284,3 +284,20 @@ def test_the_system_is_a_picture_in_which_a_buffer_is_told_broken_and_mended(doc
         seat.click(seat.button("Mend it"))
         seat.wait(f'!document.querySelector("{wire}.broken")')
         assert "NaN" not in seat.value("document.querySelector('.system svg').outerHTML")
+
+
+def test_the_bar_of_verdicts_asks_of_no_assumption_whether_it_is_proved(tmp_path: Path) -> None:
+    """It is taken for granted, and told so."""
+    assumed = "assume presses_long assumed : on for at least 2 cycles, bumper\n\nlevel drive {"
+    system = dock(tmp_path / "dock", ("level drive {", assumed))
+    with seated(Opening(system)) as seat:
+        seat.until("#verdict summary", "trusting 1 assumption about what stands outside")
+        asked = re.search(r"(\d+) requirements not asked", seat.reads("#verdict summary"))
+        assert asked
+        seat.click("#verdict summary")
+        seat.until("#verdict li", "Taken for granted of what stands outside: presses_long")
+        unasked = seat.value(
+            "[...document.querySelectorAll('#verdict li')].find((one) => one.innerText.includes('Nobody')).querySelectorAll('code').length"
+        )
+        assert unasked == int(asked[1])
+        assert "presses_long holds" not in seat.reads("#verdict ul")

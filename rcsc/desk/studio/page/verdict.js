@@ -3,7 +3,7 @@
 import { make, spoken } from "./make.js";
 import { deskOf } from "./tables/desk.js";
 
-const NOT = ["refuted", "open", "conditional", "not asked"]; // in the order in which they are told
+const NOT = { refuted: ["wrong", "refuted"], open: ["warn", "open"], conditional: ["warn", "proved under assumptions"], unknown: ["soft", "not asked"] }; // as the bar tells them, in this order
 
 export function verdicts(bus, place, show) {
   const desk = deskOf(bus);
@@ -46,8 +46,9 @@ export function verdicts(bus, place, show) {
       ...required.filter(({ state }) => state === "refuted").map((one) => item("wrong", named(one, "is refuted: a run breaks it"), one.log ? ["Show its run", () => run(one)] : prove)),
       ...required.filter(({ state }) => state === "open").map((one) => item("warn", named(one, "is open: neither proved nor refuted"), ["Read why", () => show("run").then(() => bus.tell("drawer", "required"))])),
       ...required.filter(({ state }) => state === "conditional").map((one) => item("warn", named(one, `is proved, trusting ${one.trusts.join("; ")}`))),
-      ...together(required.filter(({ state }) => !["refuted", "open", "conditional", "proved"].includes(state)), (some) => item("soft", ["Nobody has asked yet whether ", ...names(some), ` ${some.length === 1 ? "holds" : "hold"} over time`], prove)),
+      ...together(required.filter(({ state }) => state === "unknown"), (some) => item("soft", ["Nobody has asked yet whether ", ...names(some), ` ${some.length === 1 ? "holds" : "hold"} over time`], prove)),
       ...together(required.filter(({ state }) => state === "proved"), (some) => item("good", ["Proved for every run: ", ...names(some)], ["Read how", () => show("run").then(() => bus.tell("drawer", "required"))])),
+      ...together(required.filter(({ state }) => state === "assumed"), (some) => item("warn", ["Taken for granted of what stands outside: ", ...names(some)])),
       ...(build.tables ?? []).filter(({ assumptions }) => assumptions.length).map(({ table, assumptions }) => item("warn", ["Table ", make("code", {}, table), " takes for granted: ", ...listed(assumptions.map(({ name, standing }) => [make("code", {}, name), standing === "monitored" ? ", which runs watch" : ""]))])),
     ];
   }
@@ -82,11 +83,11 @@ function tablesSaid({ ok, tables = [], findings = [] }) {
 }
 
 function requiredSaid(required) {
-  const count = (is) => required.filter(({ state }) => is(state)).length;
-  const proved = count((state) => state === "proved");
-  const rest = NOT.map((word) => [word, word === "not asked" ? count((state) => !["proved", ...NOT.slice(0, 3)].includes(state)) : count((state) => state === word)]);
-  const kinds = { refuted: "wrong", open: "warn", conditional: "warn", "not asked": "soft" };
-  const words = { conditional: "proved under assumptions" };
-  return [...(proved ? [["good", `· ✓ ${proved} ${proved === 1 ? "requirement" : "requirements"} proved`]] : []),
-    ...rest.filter(([, many]) => many).map(([word, many], at) => [kinds[word], `· ${word === "refuted" ? "✗ " : ""}${many} ${proved || at ? "" : many === 1 ? "requirement " : "requirements "}${words[word] ?? word}`])];
+  const count = (word) => required.filter(({ state }) => state === word).length;
+  const proved = count("proved"), assumed = count("assumed");
+  const rest = Object.entries(NOT).map(([state, [kind, word]]) => [kind, word, count(state)]).filter(([, , many]) => many);
+  const of = (many) => (many === 1 ? "requirement" : "requirements");
+  return [...(proved ? [["good", `· ✓ ${proved} ${of(proved)} proved`]] : []),
+    ...rest.map(([kind, word, many], at) => [kind, `· ${kind === "wrong" ? "✗ " : ""}${many} ${proved || at ? "" : `${of(many)} `}${word}`]),
+    ...(assumed ? [["soft", `· trusting ${assumed} ${assumed === 1 ? "assumption" : "assumptions"} about what stands outside`]] : [])];
 }
