@@ -230,7 +230,6 @@ function offer() {
   const alone = bus.latest("build.state")?.system === false && bus.latest("time.state")?.source !== "log";
   page("time").hidden = page("state").hidden = alone;
   for (const button of page("views").children) button.hidden = alone && Boolean(VIEWS.find(({ name }) => name === button.dataset.view).ofRun);
-  return alone;
 }
 
 verdicts(bus, page("verdict"), show);

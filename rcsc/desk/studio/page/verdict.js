@@ -72,7 +72,6 @@ export function verdicts(bus, place, show) {
   }
 
   bus.on("build.state", (build) => { draw(); ask(build); });
-  bus.on("run.state", ({ open }) => { if (open && !required.length) ask(bus.latest("build.state") ?? {}); });
 }
 
 function tablesSaid({ ok, tables = [], findings = [] }) {
