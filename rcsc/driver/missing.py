@@ -27,6 +27,7 @@ _TRIED = 5
 _NAMED = 8
 """Names, and lines, that a note lists; others are counted."""
 Key = tuple[str, str, str, int]
+_Claim = tree.PropertyDecl | tree.RequirementDecl | tree.InvariantDecl
 
 
 def told(root: str, loaded: Loaded, found: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -117,7 +118,7 @@ def _declared(declarations: Iterable[tree.Declaration]) -> Iterator[str]:
 def _use_lacks(path: str, declared: set[str], gone: list[Diagnostic]) -> Diagnostic:
     names = dict.fromkeys(name for each in gone if (name := _name(each)))
     first = next(each for each in gone if _name(each) in declared)
-    others = [name for name in names if name != _name(first)]
+    others = [f"`{name}`" for name in names if name != _name(first)]
     places = f"{len(gone)} place{'' if len(gone) == 1 else 's'}"
     also = (f"so it is with {_listed(others)}, in {places} together",) if others else ()
     also = also or ((f"it is missing in {places}",) if len(gone) > 1 else ())
@@ -130,11 +131,11 @@ def _use_lacks(path: str, declared: set[str], gone: list[Diagnostic]) -> Diagnos
     )
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Return names as text; past a number of them they are counted."""
-    shown = [f"`{name}`" for name in names[:_NAMED]]
-    if len(names) > len(shown):
-        shown.append(f"{len(names) - len(shown)} more")
+def _listed(texts: Sequence[str]) -> str:
+    """Return several as one text; past a number of them they are counted."""
+    shown = list(texts[:_NAMED])
+    if len(texts) > len(shown):
+        shown.append(f"{len(texts) - len(shown)} more")
     return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
@@ -146,7 +147,7 @@ def _of_levels(root: str, loaded: Loaded, found: list[Diagnostic]) -> list[Diagn
     claims = [
         each
         for each in (loaded.files[root].declarations if root in loaded.files else ())
-        if isinstance(each, tree.PropertyDecl | tree.RequirementDecl | tree.InvariantDecl)
+        if isinstance(each, _Claim)
     ]
     spans = [(each.name.span.start, _end_of(each, loaded, root)) for each in claims]
     inside: dict[int, list[Diagnostic]] = {}
@@ -162,18 +163,14 @@ def _of_levels(root: str, loaded: Loaded, found: list[Diagnostic]) -> list[Diagn
     return found
 
 
-def _end_of(claim: tree.Declaration, loaded: Loaded, root: str) -> int:
+def _end_of(claim: _Claim, loaded: Loaded, root: str) -> int:
     """Return where the declaration after a claim begins, or the text ends."""
     starts = [
         name.span.start
         for each in loaded.files[root].declarations
         if isinstance(name := getattr(each, "name", None), tree.Name)
     ]
-    begin = (
-        claim.name.span.start
-        if isinstance(claim, tree.PropertyDecl | tree.RequirementDecl | tree.InvariantDecl)
-        else 0
-    )
+    begin = claim.name.span.start
     return min((start for start in starts if start > begin), default=len(loaded.sources[root].text))
 
 
@@ -251,8 +248,4 @@ def _once(found: Iterable[Diagnostic], loaded: Loaded) -> Iterator[Diagnostic]:
 
 def _also(lines: Sequence[int]) -> Iterator[str]:
     if lines:
-        shown = [str(line) for line in lines[:_NAMED]]
-        if len(lines) > len(shown):
-            shown.append(f"{len(lines) - len(shown)} more")
-        listed = " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
-        yield f"missed in line{'' if len(lines) == 1 else 's'} {listed}, too"
+        yield f"missed in line{'' if len(lines) == 1 else 's'} {_listed([str(line) for line in lines])}, too"
