@@ -22,7 +22,7 @@ from tests.support.programs.texts import edit_file
 
 REPO = Path(__file__).parents[2]
 LAST_ECHO = REPO / "tables" / "examples" / "later" / "last_echo.toml"
-GUIDE = REPO / "tables" / "README.md"
+GUIDE = REPO / "tables" / "guide" / "python.md"
 
 
 def test_the_examples_of_the_guide_do_what_it_shows(dock: Path, monkeypatch: pytest.MonkeyPatch) -> None:

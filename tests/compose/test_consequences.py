@@ -403,7 +403,7 @@ def test_values_that_an_invariant_excludes_are_refused(tmp_path: Path) -> None:
 
 def demonstration() -> str:
     """The command of the guide that shows what an empty buffer leads to."""
-    guide = (REPO / "tables" / "README.md").read_text(encoding="utf-8")
+    guide = (REPO / "tables" / "guide" / "README.md").read_text(encoding="utf-8")
     [command] = re.findall(r"^(rcsc prove \S*published/system.toml --where [^#\n]*)", guide, re.MULTILINE)
     return str(command)
 

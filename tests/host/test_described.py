@@ -446,7 +446,7 @@ if __name__ == "__main__":
 
 
 def test_the_guide_has_every_key_of_a_description(repo: Path) -> None:
-    text = (repo / "tables" / "system.md").read_text(encoding="utf-8")
+    text = (repo / "tables" / "guide" / "system.md").read_text(encoding="utf-8")
     shown = {key for row in re.findall(r"(?m)^\| (`.*?) \|", text) for key in re.findall(r"`(\w+)`", row)}
     kinds = (
         SYSTEM,
@@ -465,7 +465,7 @@ def test_the_guide_has_every_key_of_a_description(repo: Path) -> None:
 
 
 def test_the_example_of_the_guide_is_taken(repo: Path, tmp_path: Path) -> None:
-    text = (repo / "tables" / "system.md").read_text(encoding="utf-8")
+    text = (repo / "tables" / "guide" / "system.md").read_text(encoding="utf-8")
     whole, readers, levels, model = re.findall(r"(?ms)^```toml\n(.*?)^```", text)
     axes = (repo / "tests/data/two_axes/system.toml").read_text(encoding="utf-8")
     assert {*levels.splitlines(), readers.splitlines()[0]} <= set(axes.splitlines())

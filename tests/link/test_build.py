@@ -10,15 +10,14 @@ import pytest
 from rcsc.code.testing.boards import BOARDS
 from tests.support.programs.stages import STRICT
 
-GUIDE = Path(__file__).parents[2] / "tables/README.md"
+GUIDE = Path(__file__).parents[2] / "tables/guide/README.md"
 PRINTED = "status 0 at 640 mm\n"
 
 
 def shown(language: str) -> str:
-    """The one text in a language that the guide shows."""
-    [text] = re.findall(
-        rf"^```{language}\n(.*?)^```", GUIDE.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE
-    )
+    """The text in a language that the guide shows of a system's C."""
+    page = GUIDE.read_text(encoding="utf-8").partition("## The C of a system\n")[2]
+    [text] = re.findall(rf"^```{language}\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     return str(text)
 
 

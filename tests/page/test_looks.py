@@ -90,7 +90,7 @@ def test_a_system_that_is_not_proved_can_be_read(tmp_path: Path) -> None:
 
 
 def test_the_page_has_every_key_that_its_guide_names(seat: Seat) -> None:
-    guide = (Path(__file__).parents[2] / "tables" / "studio.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[2] / "tables" / "guide" / "studio.md").read_text(encoding="utf-8")
     guide = re.sub(r"^```.*?^```", "", guide, flags=re.MULTILINE | re.DOTALL)
     seat.press("escape", "?")
     seat.wait("document.querySelector('#keys').open")

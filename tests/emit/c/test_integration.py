@@ -120,7 +120,7 @@ def test_a_system_with_a_prefix_runs(dock: Path, monkeypatch: pytest.MonkeyPatch
         assert run(["run", str(dock / "system.toml"), "--executor", executor]) == 0
 
 
-PAGE = "tables/integration.md"
+PAGE = "tables/guide/integration.md"
 
 
 def shown(repo: Path) -> list[tuple[str, str]]:
