@@ -1,4 +1,6 @@
-"""The README's pictures: `python -m tests.picture` makes them, as SVG, from what the commands print and draw; with `studio` the studio's.
+"""The README's pictures: `python -m tests.picture` makes them, as SVG, from what the commands print and draw.
+
+With `loop` it makes the film of the cell, with `studio` the studio's picture.
 
 The studio's is what Chromium shows of it at 1280 x 800, as PNG: the paper's cell in space beside the table that runs.
 """
@@ -17,6 +19,7 @@ from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
 from rcsc.desk.shell.opening import Opening
+from rcsc.front.commands import run
 from rcsc.front.commands.group import commands
 from tests.studio.driven import seated
 
@@ -116,6 +119,10 @@ def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     if sys.argv[1:] == ["studio"]:
         studio(PICTURES / "studio.png")
+        return
+    if sys.argv[1:] == ["loop"]:
+        film = ["--video", str(PICTURES / "loop.webp"), "--video-speed", "8.5"]
+        run(["run", "make_boxt", "--system", str(REPO / "tables" / "system.toml"), "-q", *film])
         return
     for name, draw in PICTURE_OF.items():
         (PICTURES / name).write_text(draw(), encoding="utf-8")

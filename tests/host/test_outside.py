@@ -860,6 +860,7 @@ STREAMS = (
     "rcsc/run/campaign/journal.py",
     "rcsc/front/commands/systems/shell.py",
     "rcsc/run/processes/block.py",
+    "rcsc/views/pages/video.py",
 )
 """The writer itself, what is added to at its end and read as far as it goes, and what is no file of the disk's."""
 

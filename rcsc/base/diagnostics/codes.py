@@ -1663,6 +1663,12 @@ class Code(StrEnum):
     replayed as far as the chain holds, and nothing is said about the rest. The chain has no key: it shows that a log was damaged, and
     not that nobody made another.
     """
+    NO_FILM = """RCS708: no film can be made
+
+    `rcsc run --video` films what stands outside the levels in space: a plant in Python has a method `space` for it, a model for MuJoCo has
+    it by itself. MuJoCo draws the pictures without a screen, by the OpenGL of the machine: on Debian and Ubuntu `libegl1` and
+    `libgl1-mesa-dri` bring one that needs no graphics card.
+    """
     BAD_SYSTEM = """RCS721: the system cannot be put together
 
     The description (`system.toml`) cannot be read, has a key that means nothing or lacks one, names a buffer, a party, a level or a

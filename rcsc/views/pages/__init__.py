@@ -21,7 +21,9 @@ True
 Any system has these; a plant may add what is true of it alone (`Staged.witness`). Nothing here is trusted for a proof. What it costs: a
 copy of what is drawn, a cycle; a report keeps a picture every 25 cycles at the least.
 
+A *film* of a run is a file, too: what stands outside, in space, photographed when the run is over.
+
 Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `data` says
 who knows the world outside and draws it; `witness` watches a run, `log_page` reads one; `report`, `finding_page` and
-`requirement_page` are pages.
+`requirement_page` are pages; `video` is a film.
 """

@@ -20,6 +20,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "parquet": ("pyarrow",),
     "plot": ("matplotlib",),
     "studio": ("aiohttp", "mcap", "zstandard"),
+    "video": ("av", "PIL", "mujoco", "mcap", "zstandard"),
 }
 """What each extra of `pyproject.toml` makes importable; of two with one package the smaller comes first.
 

@@ -41,6 +41,23 @@ if TYPE_CHECKING:
     from rcsc.lang.model import Property
     from rcsc.run.log.required import BrokenRequirement
     from rcsc.run.plant.staged import Staged
+    from rcsc.run.system import System
+    from rcsc.views.pages.video import Filming
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """A film of the run.
+
+    Attributes:
+        path: The file.
+        speed: Times as fast as the clock.
+        view: From where it is filmed.
+    """
+
+    path: Path
+    speed: float
+    view: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +71,7 @@ class RunOptions:
         most: Cycles at most; None where nobody says.
         in_step: Whether processes run each cycle together, as one process does.
         again: What to type for the same run; how it begins is to be added.
+        film: Where the film of it goes; None for none.
     """
 
     title: str
@@ -67,6 +85,7 @@ class RunOptions:
     quiet: bool
     again: str
     in_step: bool = False
+    film: "Film | None" = None
 
 
 @click.command(
@@ -82,6 +101,7 @@ Examples:
   rcsc run make_boxt --plant kinematic   without physics
   rcsc run make_boxt --log boxt.mcap     keep every cycle
   rcsc run make_boxt --report boxt.html  a page about it
+  rcsc run make_boxt --video boxt.mp4 --video-speed 10   a film of it
   rcsc run make_boxt --live              in the studio's page
   rcsc run make_boxt --processes         each level in a process of its own
   rcsc run make_boxt --resume            go on from the row that stopped it""",
@@ -103,6 +123,12 @@ Examples:
               help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the system.")  # fmt: skip
 @click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Write a page about the run: its ticks, pictures, curves, lines, timing; one file that needs nothing else.")  # fmt: skip
+@click.option("--video", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Film what stands outside: FILE.mp4, FILE.gif or FILE.webp.")  # fmt: skip
+@click.option("--video-speed", type=click.FloatRange(min=0.1, max=100), default=1.0, show_default=True, metavar="N",
+              help="Times as fast as the clock the film goes.")  # fmt: skip
+@click.option("--video-view", type=click.Choice(["corner", "front", "left", "above"]), default="corner", show_default=True,
+              help="From where it is filmed.")  # fmt: skip
 @click.option("--live", is_flag=True,
               help="Run it in the studio: a page for a browser on this machine, at --rate, until Ctrl-C.")  # fmt: skip
 @COMPILES
@@ -119,7 +145,8 @@ Examples:
 @click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
 def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     target: str | None, system: Path | None, script: str | None, plant: str | None, executor: str,
-    database: Path | None, seed: int, faults: tuple[str, ...], cycles: int | None, log: Path | None, report: Path | None, live: bool,
+    database: Path | None, seed: int, faults: tuple[str, ...], cycles: int | None, log: Path | None, report: Path | None,
+    video: Path | None, video_speed: float, video_view: str, live: bool,
     compiles: bool, processes: bool, in_step: bool, rate: float | None, from_row: int | None, resumes: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Run SYSTEM with its plant and its script, or SCRIPT in the system that is here.
@@ -133,10 +160,11 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError("--resume and --live are of one process; with --processes, use --from-row")
     if in_step and not processes:
         raise click.UsageError("--in-step is of --processes: one process does nothing else")
-    if live and (resumes or from_row or report or cycles or log):
+    if live and (resumes or from_row or report or cycles or log or video):
         raise click.UsageError(
-            "--resume, --from-row, --report, --log and --cycles are of a run that no page leads; leave --live out"
+            "--resume, --from-row, --report, --video, --log and --cycles are of a run that no page leads; leave --live out"
         )
+    filmed = _film(video, video_speed, video_view, processes=processes)
     if live:
         need("studio")
     path, named = meant(target, system, script)
@@ -161,7 +189,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paced = rate or (WATCHED_RATE if processes else None)
     again = _command(target, system, script, database, executor, plant)
     title = named or described.name
-    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again, in_step)
+    asked = RunOptions(title, path, order, kind, log, report, paced, cycles, quiet, again, in_step, filmed)
     try:
         return _apart(asked, from_row) if processes else _run(asked, from_row, resumes)
     except ChildProcessError as error:
@@ -200,6 +228,7 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
     stage = staged(asked.order, system, signs)
     running = assemble(system, asked.kind, stage.queries, standing(stage, system, signs))
     run = ScriptedRun(running, stage.operator)
+    filming = _filming(running, asked.film)
     _place(run, stage.resume, from_row, resumes)
     witness = stage.witness(run) if stage.witness else RunWitness(run, stage.pictures)
     witness.film = asked.report is not None
@@ -215,6 +244,8 @@ def _run(asked: RunOptions, from_row: int | None, resumes: bool) -> int:
             raise _interrupted(run, log) from error
     if asked.report is not None:
         _write_report(asked.report, witness, log, asked, seconds)
+    if filming is not None and asked.film is not None:
+        _write_film(running, filming, asked.film)
     broken = _watched(wanted, log, quiet=asked.quiet)
     return _closing(witness, stage.resume, asked, seconds, log) or int(broken)
 
@@ -493,6 +524,66 @@ def _write_report(path: Path, witness: RunWitness, log: Path, asked: RunOptions,
     _report(path, with_ticks(story, whole, drawn))
 
 
+def _film(path: Path | None, speed: float, view: str, *, processes: bool) -> Film | None:
+    """Return what film is asked for, where one is.
+
+    Raises:
+        UsageError: Nobody writes such a file, or the run is one that is not filmed.
+        Stopped: A package is not installed.
+    """
+    if path is None:
+        return None
+    if path.suffix not in (forms := (".mp4", ".gif", ".webp")):
+        raise click.UsageError(f"--video writes {', '.join(forms)}, and not `{path.name}`")
+    if processes:
+        raise click.UsageError("--video films a run in one process; leave --processes out")
+    need("video")
+    return Film(path, speed, view)
+
+
+def _filming(system: "System", film: Film | None) -> "Filming | None":
+    """Begin to keep what a film needs.
+
+    Raises:
+        Stopped: Nothing stands outside that can be seen.
+    """
+    if film is None:
+        return None
+    from rcsc.run.plant.space import space_of
+    from rcsc.views.pages.video import Filming
+
+    if space_of(system.outside) is None:
+        raise Stopped(
+            Code.NO_FILM,
+            "nothing that stands outside says how it looks in space",
+            "a plant has a method `space`, or is a model for MuJoCo",
+        )
+    filming = Filming(film.speed)
+    system.watch.append(filming)
+    return filming
+
+
+def _write_film(system: "System", filming: "Filming", film: Film) -> None:
+    """Photograph what was kept.
+
+    Raises:
+        Stopped: Nothing draws here, or the file cannot be written.
+    """
+    from rcsc.run.plant.models.camera import NoPictureError
+    from rcsc.run.plant.space import space_of
+    from rcsc.views.pages.video import write
+
+    space = space_of(system.outside)
+    if space is None or not filming.frames:
+        return
+    try:
+        write(film.path, filming.frames, space, film.view)
+    except NoPictureError as error:
+        raise Stopped(Code.NO_FILM, f"no film: {error}") from error
+    except OSError as error:
+        raise BadDescription(f"the film {film.path} cannot be written: {error.strerror}") from error
+
+
 def _report(path: Path, story: Story) -> None:
     try:
         report(path, story)
@@ -502,7 +593,11 @@ def _report(path: Path, story: Story) -> None:
 
 def _files(asked: RunOptions, log: Path) -> str:
     here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
-    return f"log: {here}" + (f"; report: {asked.report}" if asked.report else "")
+    return (
+        f"log: {here}"
+        + (f"; report: {asked.report}" if asked.report else "")
+        + (f"; film: {asked.film.path}" if asked.film else "")
+    )
 
 
 def _closing(

@@ -25,5 +25,5 @@ Nothing here is trusted for a proof. What it costs: the steps, and one more eval
 now.
 
 Modules, in the order the data flows: `bindings` (names, units and ranges checked), `space` (how a model looks, for the
-studio), `solid` (the faces of its shapes from far to near, as SVG), `model_plant` (what moves).
+studio), `camera` (photographs any space), `solid` (the faces of its shapes from far to near, as SVG), `model_plant` (what moves).
 """
