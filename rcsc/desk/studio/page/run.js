@@ -275,7 +275,8 @@ function valuesTab(bus) {
       value.addEventListener("focus", () => { editing = value; });
       const set = () => { editing = null; bus.try("run.type", { line: `${level}-level.${one.name} = ${value.value}` }).then((answer) => { if (!answer) ask(); }); };
       value.addEventListener("change", set);
-      return make("tr", { class: one.changed ? "changed" : "" }, make("td", { class: "code" }, one.name), make("td", {}, value), make("td", { class: "soft" }, one.unit),
+      const dragged = (event) => event.dataTransfer.setData("text/plain", `${level}.${one.name}`);
+      return make("tr", { class: one.changed ? "changed" : "" }, make("td", { class: "code", draggable: "true", title: "Drag it to the curves", ondragstart: dragged }, one.name), make("td", {}, value), make("td", { class: "soft" }, one.unit),
         make("td", {}, one.changed ? "changed" : ""), make("td", { class: "soft" }, one.kind), make("td", { class: "soft" }, one.range),
         make("td", { class: "soft doc" }, one.doc));
     }));

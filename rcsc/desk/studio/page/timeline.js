@@ -3,6 +3,7 @@
 import { controls } from "./controls.js";
 import { atSecond, colour, make } from "./make.js";
 import { followMoments, lookAt } from "./moments.js";
+import { playing } from "./playing.js";
 
 const [AXIS, ROW, LEAST] = [18, 20, 8]; // pixels, pixels, ticks
 
@@ -69,6 +70,13 @@ export function mount(root, bus) {
     for (const letter of text) hash = (hash * 31 + letter.codePointAt(0)) % 360;
     return dark() ? `hsl(${hash} 28% ${at % 2 ? 27 : 22}%)` : `hsl(${hash} 55% ${at % 2 ? 88 : 82}%)`;
   };
+  /** Show other ticks; the curves show the same. */
+  function seen(change) {
+    Object.assign(view, change);
+    bus.tell("span", view.whole ? null : { from: view.from, to: view.to });
+  }
+  bus.on("span", (span) => { Object.assign(view, { whole: !span }, span ?? {}); soon(); });
+  const shownTicks = () => (view.whole ? [tracks.first, tracks.last] : [Math.max(tracks.first, Math.ceil(view.from)), Math.min(tracks.last, Math.floor(view.to))]);
   const fit = () => Object.assign(view, { from: tracks.first, to: tracks.first + Math.max(LEAST, tracks.last - tracks.first) });
   const x = (tick) => (tick - view.from) / (view.to - view.from) * across;
   const tickAt = (pixel) => view.from + pixel / canvas.clientWidth * (view.to - view.from);
@@ -92,7 +100,7 @@ export function mount(root, bus) {
     if (view.whole) fit();
     else if (bus.selection.follow && bus.selection.tick !== null && bus.selection.tick > view.to) {
       const width = view.to - view.from;
-      Object.assign(view, { to: bus.selection.tick + width * 0.05, from: bus.selection.tick - width * 0.95 });
+      seen({ to: bus.selection.tick + width * 0.05, from: bus.selection.tick - width * 0.95 });
     }
     const say = colours();
     const now = JSON.stringify([key, told, view, wide, high, ratio, levels, run?.tick_ms, bus.selection.level, Object.values(say)]);
@@ -114,7 +122,7 @@ export function mount(root, bus) {
   function begun(one, ratio) {
     const on = one.getContext("2d");
     on.setTransform(ratio, 0, 0, ratio, 0, 0);
-    on.font = "11px system-ui, sans-serif";
+    on.font = "12px system-ui, sans-serif";
     on.textBaseline = "middle";
     return on;
   }
@@ -222,8 +230,7 @@ export function mount(root, bus) {
     if (dragging === "scrub") lookAt(bus, Math.ceil(tickAt(event.clientX - canvas.getBoundingClientRect().left)));
     else if (dragging) {
       const by = (dragging.x - (event.clientX - canvas.getBoundingClientRect().left)) / canvas.clientWidth * (dragging.to - dragging.from);
-      Object.assign(view, { whole: false, from: dragging.from + by, to: dragging.to + by });
-      soon();
+      seen({ whole: false, from: dragging.from + by, to: dragging.to + by });
     }
   }
   slider.addEventListener("pointermove", (event) => { if (dragging) move(event); });
@@ -236,13 +243,11 @@ export function mount(root, bus) {
   function zoom(times, around = bus.selection.tick ?? view.from) {
     const width = Math.min(Math.max(LEAST, (view.to - view.from) * times), Math.max(LEAST, tracks.last - tracks.first));
     const part = (around - view.from) / (view.to - view.from);
-    Object.assign(view, { whole: width >= tracks.last - tracks.first, from: around - width * part, to: around + width * (1 - part) });
-    soon();
+    seen({ whole: width >= tracks.last - tracks.first, from: around - width * part, to: around + width * (1 - part) });
   }
   function pan(by) {
     const width = view.to - view.from;
-    Object.assign(view, { whole: false, from: view.from + by * width, to: view.to + by * width });
-    soon();
+    seen({ whole: false, from: view.from + by * width, to: view.to + by * width });
   }
 
   // --- by keys ---
@@ -293,7 +298,7 @@ export function mount(root, bus) {
   for (const [keys, what, run] of [
     ["[", "The tick before", () => go(here() - 1)], ["]", "The tick after", () => go(here() + 1)],
     ["{", "The change of line before, of the level chosen", () => change(-1)], ["}", "The change of line after", () => change(1)],
-    ["+, =", "Closer", () => zoom(0.6)], ["-", "Farther", () => zoom(1.7)], ["0", "The whole run", () => { view.whole = true; soon(); }],
+    ["+, =", "Closer", () => zoom(0.6)], ["-", "Farther", () => zoom(1.7)], ["0", "The whole run", () => seen({ whole: true })],
     ...(finds ? [["m", "The next mark: a finding, a stop, what was done by hand", () => mark(1)], ["M", "The mark before", () => mark(-1)],
       ["f", "Find a tick by a condition; Enter the next, Shift+Enter the one before", () => find.focus()],
       ["n", "The next tick found", () => search(false)], ["N", "The one before", () => search(true)]] : []),
@@ -303,10 +308,10 @@ export function mount(root, bus) {
 
   find.addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); search(event.shiftKey); } if (event.key === "Escape") slider.focus(); });
   const button = (text, title, run) => make("button", { type: "button", title, onclick: run }, text);
-  bar.append(readout, button("⇤ change", "The change of line before, of the level chosen: {", () => change(-1)), button("change ⇥", "The change of line after: }", () => change(1)),
+  bar.append(readout, ...playing(bus, shownTicks), button("⇤ change", "The change of line before, of the level chosen: {", () => change(-1)), button("change ⇥", "The change of line after: }", () => change(1)),
     ...(finds ? [button("⇤ mark", "The mark before: M", () => mark(-1)), button("mark ⇥", "The next mark: m", () => mark(1))] : []),
     ...(finds ? [find, button("Before", "The tick before in which it holds: N", () => search(true)), button("Next", "The next tick in which it holds: n", () => search(false))] : []),
-    button("−", "Farther", () => zoom(1.7)), button("+", "Closer", () => zoom(0.6)), button("Whole run", "The whole run: 0", () => { view.whole = true; soon(); }));
+    button("−", "Farther", () => zoom(1.7)), button("+", "Closer", () => zoom(0.6)), button("All", "The whole run: 0", () => seen({ whole: true })));
 
   bus.on("selection", soon);
   bus.on("theme", soon);

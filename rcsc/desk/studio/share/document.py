@@ -16,7 +16,7 @@ from markupsafe import Markup
 from rcsc.views.pages.frame import environment, hashed, packed
 
 PARTS = (
-    "make.js", "bus.js", "keys.js", "moments.js", "exchanges.js", "level.js", "film.js", "controls.js", "timeline.js",
+    "make.js", "bus.js", "keys.js", "moments.js", "exchanges.js", "level.js", "film.js", "controls.js", "playing.js", "timeline.js",
     "vendor/uplot/uPlot.js", "plots.js", "player.js",
 )  # fmt: skip
 """Modules of the studio's page of which a file's script is made; each takes from those before it alone."""
