@@ -1,4 +1,4 @@
-"""Curves and player in a real browser: what was recorded is played, all curves and the time line show the same ticks and the same moment."""
+"""Curves and player in a real browser: what was recorded is played, all curves and the time line show the same ticks."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -112,7 +112,8 @@ def test_a_derivative_is_drawn_in_its_unit_and_a_variable_is_dropped_in(seat: Se
     seat.until(".legend", " mm/s")
     seat.value(
         "(() => { const moved = new DataTransfer(); moved.setData('text/plain', 'drive.lateral_mm');"
-        "document.querySelector('.graph').dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true, dataTransfer: moved })); })()"
+        "const drop = new DragEvent('drop', { bubbles: true, cancelable: true, dataTransfer: moved });"
+        "document.querySelector('.graph').dispatchEvent(drop); })()"
     )
     seat.until(".graph .legend", "drive.lateral_mm = ")
     assert seat.value("document.querySelectorAll('.graph').length") == graphs

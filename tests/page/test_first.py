@@ -301,3 +301,22 @@ def test_the_bar_of_verdicts_asks_of_no_assumption_whether_it_is_proved(tmp_path
         )
         assert unasked == int(asked[1])
         assert "presses_long holds" not in seat.reads("#verdict ul")
+
+
+def test_what_stands_in_the_cell_has_its_name_above_it_where_it_is_seen(docks: Path) -> None:
+    plates = "[...document.querySelectorAll('.plate')].filter((one) => !one.hidden)"
+    apart = (
+        f"(() => {{ const boxes = {plates}.map((one) => one.getBoundingClientRect());"
+        "return boxes.every((one, at) => boxes.slice(at + 1).every((other) =>"
+        " one.right <= other.left || other.right <= one.left || one.bottom <= other.top || other.bottom <= one.top)); })()"
+    )
+    with seated(Opening(docks), in_space=True) as seat:
+        seat.until("#state", "paused at cycle 0")
+        seat.press("4")
+        seat.wait(f"{plates}.length > 0")
+        shown = set(seat.settled(f"{plates}.map(({{ textContent }}) => textContent)"))
+        assert shown
+        assert shown <= {"left guide", "right guide"}
+        assert seat.value(apart)
+        seat.click(".view-cell label input[type=checkbox]")
+        seat.wait(f"{plates}.length === 0")

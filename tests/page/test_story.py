@@ -20,6 +20,7 @@ OFFERED = (
     "[...document.querySelector('.table-choice')?.options ?? []].some(({ text }) => text.startsWith('goto '))"
 )
 """The table is among those that one can choose."""
+GRAPHS = "document.querySelectorAll('.graph canvas').length > 2"
 NOW = "Number(document.querySelector('#time [role=slider]').getAttribute('aria-valuenow'))"
 """The tick that the time line shows."""
 
@@ -111,6 +112,64 @@ def _looked_back(seat: Seat, last: int) -> None:
     assert seat.tick() < last
     seat.press("e")
     seat.wait(f"{NOW} === {last} && !{shown}.includes('line start')")
+
+
+def shown_by_mouse(seat: Seat) -> None:
+    """From the card that says what it is to a file that is handed on: run, looked at, played, proved together, shared."""
+    seat.click(seat.button("Run the demo"))
+    seat.until(".ended", "the script is at its end")
+    seat.click(seat.button("Levels"))
+    seat.click_time(0.3)
+    seat.wait(f"{NOW} > 10 && {NOW} < 100")
+    seat.click(seat.button("Curves"))
+    seat.wait(GRAPHS)
+    seat.click(seat.button("▶ Play"))
+    seat.wait(f"{NOW} > 110")
+    seat.click(seat.button("■ Stop"))
+    seat.click(seat.button("System"))
+    seat.wait("document.querySelector('.view-system svg')?.checkVisibility()")
+    seat.click("#verdict summary")
+    seat.click(seat.button("Prove the levels together", "#verdict"))
+    seat.until("#verdict summary", "requirements proved")
+    seat.click("#verdict summary")
+    seat.click(seat.button("Share"))
+    seat.click(seat.button("Tick"))
+
+
+def shown_by_keys(seat: Seat) -> None:
+    """The same without a mouse."""
+    seat.go_to("Run the demo")
+    seat.press("enter")
+    seat.until(".ended", "the script is at its end")
+    seat.press("escape", "1", "l", "home", "pageup", "escape")
+    seat.wait(f"{NOW} > 10 && {NOW} < 110")
+    seat.press("5")
+    seat.wait(GRAPHS)
+    seat.press("k")
+    seat.wait(f"{NOW} > 120")
+    seat.press("k", "6")
+    seat.wait("document.querySelector('.view-system svg')?.checkVisibility()")
+    seat.value("document.querySelector('#verdict summary').focus()")
+    seat.press("enter")
+    seat.go_to("Prove the levels together")
+    seat.press("enter")
+    seat.until("#verdict summary", "requirements proved")
+    seat.press("escape", "x")
+    seat.go_to("Tick")
+    seat.press("enter")
+
+
+@pytest.mark.parametrize("hands", [shown_by_mouse, shown_by_keys])
+def test_a_robot_is_run_looked_back_at_played_proved_together_and_handed_on(
+    hands: Callable[[Seat], None], tmp_path: Path
+) -> None:
+    """With the tests below and above, the first ten minutes as the guide of the studio tells them."""
+    system = dock(tmp_path / "dock")
+    assert rcsc(["compile", "-q", str(system)]) == 0
+    with seated(Opening(system, script="dock.csv"), first_time=True, in_space=True) as seat:
+        seat.until("#about", "exactly one line of its state table matches")
+        hands(seat)
+        seat.until("#said", "is shared as ")
 
 
 def never(_: Path) -> None:

@@ -207,7 +207,7 @@ def _station(station: Station) -> str:
     return f"""<geom class="look" group="0" type="box" pos="{_metres((x, y, z / 2 - 20.0))}" size="0.06 0.06 {half:.6f}"
  {_turned(station.yaw_deg)} material="dark"/>
 <body name="{station.name}" pos="{_metres((x, y, z))}" {_turned(station.yaw_deg)}>
-<geom name="{station.name}_top" class="fixed" type="box" pos="0 0 -0.02" size="{length} {width} 0.02" material="table"/>
+<geom name="{station.name}" class="fixed" type="box" pos="0 0 -0.02" size="{length} {width} 0.02" material="table"/>
 {vise}{vblock}</body>"""
 
 
@@ -234,7 +234,7 @@ def _vise(fixture: Mapping[str, object]) -> str:
 
 def _machine() -> str:
     """Write the machine behind the vise; it touches nothing."""
-    return """<geom class="look" group="0" type="box" pos="0.36 0 0.10" size="0.10 0.16 0.45" material="steel"/>
+    return """<geom name="machine" class="look" group="0" type="box" pos="0.36 0 0.10" size="0.10 0.16 0.45" material="steel"/>
 <geom class="look" group="0" type="box" pos="0.24 0 0.37" size="0.06 0.05 0.09" material="dark"/>
 """
 

@@ -5,7 +5,7 @@ import { colour, make, spoken } from "./make.js";
 import { OrbitControls } from "./vendor/three/OrbitControls.js";
 import * as THREE from "./vendor/three/three.module.js";
 
-const [FLOOR_M, GRID_M] = [2, 0.2];
+const [FLOOR_M, GRID_M, LEAST_M] = [2, 0.2, 0.05]; // LEAST_M: half the width from which on what stands is called by its name
 const FROM = { front: ["from the front", [1, 0, 0.12]], left: ["from the left", [0, -1, 0.12]], above: ["from above", [0, -0.001, 1]] }; // where the eye is, of the middle
 
 export function mount(root, bus) {
@@ -16,10 +16,12 @@ export function mount(root, bus) {
     make("option", { value: "projections" }, "in projections"));
   const note = make("span", { class: "soft grow" });
   const canvas = make("canvas", { tabindex: "0", "aria-label": "The cell in space; arrow keys turn it, + and - go nearer and farther", "data-keys": "own" });
-  const stage = make("div", { class: "stage" }, canvas);
+  const plates = make("div", { "aria-hidden": "true" });
+  const named = make("input", { type: "checkbox", checked: true, onchange: () => soon() });
+  const stage = make("div", { class: "stage" }, canvas, plates);
   const drawing = make("div", { class: "drawing scroll", hidden: true, tabindex: "0", role: "img" });
   const why = make("div", { class: "closed pre", role: "status", hidden: true });
-  root.append(make("div", { class: "bar" }, how, make("label", {}, "Look at ", look), make("label", {}, "Trace ", trace), note), stage, drawing, why);
+  root.append(make("div", { class: "bar" }, how, make("label", {}, "Look at ", look), make("label", {}, "Trace ", trace), make("label", { title: "Names of what stands" }, named, " names"), note), stage, drawing, why);
 
   let state = { space: false, drawn: false, why: "" };
   let space = null, renderer = null, shown = true, asking = false, wanted = "", got = "";
@@ -89,20 +91,60 @@ export function mount(root, bus) {
   function soon() {
     if (due || !renderer || !shown) return;
     due = true;
-    requestAnimationFrame(() => { due = false; controls.update(); renderer.render(scene, camera); root.dataset.frames = Number(root.dataset.frames ?? 0) + 1; });
+    requestAnimationFrame(() => { due = false; controls.update(); renderer.render(scene, camera); label(); root.dataset.frames = Number(root.dataset.frames ?? 0) + 1; });
   }
 
+  const eye = new THREE.Raycaster();
+
+  /** Names of what stands fixed, above it: the larger first, and none over another or of what is hidden. */
+  function label() {
+    const taken = [], { clientWidth: wide, clientHeight: high } = stage;
+    for (const one of plates.children) {
+      const [width, height] = [9 + 7.2 * one.textContent.length, 18];
+      const boxes = named.checked ? one.tops.map((top) => [top, top.clone().project(camera)]).filter(([top, { z }]) => z < 1 && seen(top, one.of))
+        .map(([, place]) => [(place.x + 1) / 2 * wide, (1 - place.y) / 2 * high]).map(([x, y]) => [x - width / 2, y - height - 2, x + width / 2, y - 2]) : [];
+      const box = boxes.find(([left, up, right, down]) => left > 0 && up > 0 && right < wide && down < high && !taken.some((other) => left < other[2] && other[0] < right && up < other[3] && other[1] < down));
+      one.hidden = !box;
+      if (!box) continue;
+      taken.push(box);
+      one.style.transform = `translate(${Math.round(box[0])}px, ${Math.round(box[1])}px)`;
+    }
+  }
+
+  /** Whether nothing stands before a point of a shape. */
+  function seen(point, of) {
+    const way = point.clone().sub(camera.position), far = way.length();
+    eye.set(camera.position, way.normalize());
+    return !eye.intersectObject(room, true).some(({ distance, object }) => distance < far - 0.02 && object !== of && !object.userData.endless);
+  }
+
+  /** Places on top of a shape: its middle, and near its edges. */
+  function topsOf(mesh) {
+    const { min, max } = new THREE.Box3().setFromObject(mesh), middle = min.clone().add(max).multiplyScalar(0.5);
+    return [[0, 0], [0.35, 0], [-0.35, 0], [0, 0.35], [0, -0.35]].map(([x, y]) => new THREE.Vector3(middle.x + x * (max.x - min.x), middle.y + y * (max.y - min.y), max.z));
+  }
+
+  /** A plate for each shape that has a name, stands fixed and is no small thing, the largest first. */
+  function platesOf(shapes) {
+    const fixed = shapes.map((one, at) => [one, solids[at]]).filter(([{ body, kind, name, size_m: [a, b] }]) => body < 0 && kind !== "plane" && name && Math.max(a, b) >= LEAST_M && a * b > 0)
+      .sort(([one], [other]) => other.size_m[0] * other.size_m[1] - one.size_m[0] * one.size_m[1]);
+    plates.replaceChildren(...fixed.map(([{ name }, mesh]) => Object.assign(make("span", { class: "plate" }, name.replaceAll("_", " ")), { of: mesh, tops: topsOf(mesh) })));
+  }
+
+  let solids = [];
   function build(answer) {
     space = answer;
     room.clear();
     groups = answer.bodies.map(() => new THREE.Group());
     room.add(...groups);
-    for (const shape of answer.shapes) (shape.body < 0 ? room : groups[shape.body]).add(solid(shape));
+    solids = answer.shapes.map(solid);
+    answer.shapes.forEach(({ body }, at) => (body < 0 ? room : groups[body]).add(solids[at]));
+    platesOf(answer.shapes);
     const option = (value, text) => make("option", { value }, text);
-    const named = answer.bodies.map((name, at) => option(at, name || `body ${at}`));
-    look.replaceChildren(option("", whole), ...Object.entries(FROM).map(([key, [text]]) => option(key, text)), ...named.map((one) => one.cloneNode(true)));
+    const bodies = answer.bodies.map((name, at) => option(at, name || `body ${at}`));
+    look.replaceChildren(option("", whole), ...Object.entries(FROM).map(([key, [text]]) => option(key, text)), ...bodies.map((one) => one.cloneNode(true)));
     shade.visible = grid.visible = answer.shapes.some(({ kind }) => kind === "plane");
-    trace.replaceChildren(option("", "none"), ...named);
+    trace.replaceChildren(option("", "none"), ...bodies);
     const hand = answer.bodies.findIndex((name) => /hand|grip|tool|plate/i.test(name));
     if (hand >= 0) trace.value = String(hand);
   }
