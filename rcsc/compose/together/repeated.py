@@ -4,7 +4,7 @@ In: a system with the proofs of its levels. Out: `Answers`. A run is an `Explana
 keeps runs serves this one, too.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.base.host.cache import Cache
@@ -90,8 +90,11 @@ def answers(
     settings: TraceSettings,
     cache: Cache | None,
     only: Collection[str] = (),
+    told: Callable[[str, int, int], None] = lambda *_: None,
 ) -> Answers | None:
     """Answer the requirements across levels, or only those of these names; None where the system states none.
+
+    Before each, `told` is given its name, its number and how many there are.
 
     Raises:
         NoProgramError: Their file is not in order.
@@ -104,7 +107,8 @@ def answers(
     if only:
         program = replace(program, properties=tuple(one for one in program.properties if one.name in only))
     every = []
-    for question in questions(systems, settings.system, program, whole):
+    for number, question in enumerate(questions(systems, settings.system, program, whole), 1):
+        told(question.stated.name, number, len(program.properties))
         found = answered(question, cache)
         every.append((found, repeated(found, systems, settings) if found.run else None))
     return Answers(program, loaded, tuple(every))

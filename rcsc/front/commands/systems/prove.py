@@ -75,7 +75,8 @@ Examples:
               help="Print, too, what each property and requirement needs, and what can be left out unnoticed.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--progress", is_flag=True,
-              help="Print each level on standard error once it is done; a terminal always shows it.")  # fmt: skip
+              help="Print each level and requirement on standard error once it is done; a terminal always shows it, and what it "
+              "took last time.")  # fmt: skip
 @click.option("--strict", is_flag=True,
               help="Exit with status 1 also where a claim was not looked at, or rests on an unproved one.")  # fmt: skip
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")

@@ -63,6 +63,7 @@ from rcsc.front.commands.shared.proved import (
 )
 from rcsc.front.commands.shared.show import Color, Progress, UnwritableError, say, wants_color
 from rcsc.front.commands.shared.stopped import say_error
+from rcsc.front.commands.shared.took import Answering, Clock
 from rcsc.front.commands.systems import across
 from rcsc.front.commands.systems.covering import coverage_as_json, lines_of
 from rcsc.front.commands.systems.explained import explanation_as_json, say_exercise, say_explanation
@@ -131,7 +132,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     across.check_names(asked.required, systems, settings.system)
     effort = Effort(limits=Limits.of(asked.steps))
     large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
-    with _LevelProgress(names, wanted=asked.progress) as done:
+    clock = Clock(cache, path)
+    with _LevelProgress(names, clock, wanted=asked.progress) as done:
         jobs = asked.jobs or (cores() if large else 1)
         if asked.only or asked.variants:
             alone = proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
@@ -141,7 +143,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     if asked.certificate is not None:
         _write(asked.certificate, systems, alone)
     begun = time.perf_counter()
-    given = None if asked.only or asked.variants else _across(systems, proof, settings, cache, asked)
+    given = None if asked.only or asked.variants else _across(systems, proof, settings, cache, asked, clock)
     proof = replace(proof, seconds=proof.seconds + time.perf_counter() - begun)
     if given is not None:
         sources |= given.loaded.sources
@@ -190,10 +192,12 @@ def _across(
     settings: TraceSettings,
     cache: Cache | None,
     asked: Asked,
+    clock: Clock,
 ) -> Answers | None:
     """Answer the requirements across levels; none where the system states none."""
     try:
-        return answers(systems, proof, settings, cache, asked.required)
+        with Answering(clock, wanted=asked.progress) as told:
+            return answers(systems, proof, settings, cache, asked.required, told)
     except OSError as error:
         place = str(error.filename or asked.logs)
         raise UnwritableError(place, error.strerror or "no reason given") from error
@@ -385,8 +389,8 @@ def _lines(
 class _LevelProgress:
     """Name each level on standard error as it is done, and on a terminal those that are still to come."""
 
-    def __init__(self, names: Sequence[str], *, wanted: bool) -> None:
-        self._left = list(names)
+    def __init__(self, names: Sequence[str], clock: Clock, *, wanted: bool) -> None:
+        self._left, self._clock = list(names), clock
         self._line = Progress()
         self._wanted = wanted or self._line.shown
 
@@ -396,15 +400,19 @@ class _LevelProgress:
 
     def __exit__(self, *_: object) -> None:
         self._line("")
+        self._clock.keep()
 
     def _doing(self) -> None:
-        self._line(f"proving {', '.join(self._left)}" if self._left else "")
+        left = ", ".join(self._clock.said(name) for name in self._left)
+        self._line(f"proving {left}" if left else "")
 
     def _done(self, proof: LevelProof) -> None:
         self._line("")
         count = f"{len(proof.verdicts) - len(proof.open)} of {len(proof.verdicts)} found proved"
         if self._wanted:
             click.echo(f"level {proof.level}: {count}, {proof.seconds:.1f} s", err=True)
+        if not proof.cached:
+            self._clock.took(proof.level, proof.seconds)
         self._left.remove(proof.level)
         self._doing()
 
