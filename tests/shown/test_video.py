@@ -4,32 +4,11 @@ import importlib
 from itertools import pairwise
 from pathlib import Path
 
-import av
-import numpy as np
-import numpy.typing as npt
 import pytest
-from PIL import Image, ImageSequence
 
 from rcsc.front.commands import run
 from rcsc.run.plant.models import camera
-
-Picture = npt.NDArray[np.uint8]
-
-
-def pictures(film: Path) -> list[Picture]:
-    """The pictures of a film, decoded."""
-    if film.suffix == ".mp4":
-        with av.open(str(film)) as opened:
-            return [frame.to_ndarray(format="rgb24").astype(np.uint8) for frame in opened.decode(video=0)]
-    with Image.open(film) as opened:
-        return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(opened)]
-
-
-def blue(picture: Picture) -> tuple[float, float]:
-    """Where the robot's blue is: the middle of its pixels, across and down."""
-    red, green, blue = (picture[:, :, part].astype(int) for part in range(3))
-    rows, columns = np.nonzero((blue > red + 50) & (blue > green + 25))
-    return float(columns.mean()), float(rows.mean())
+from tests.support.films import blue, pictures
 
 
 def films(dock: Path, *options: str) -> int:
@@ -49,7 +28,7 @@ def test_a_film_shows_the_run_at_its_speed(dock: Path, form: str) -> None:
     places = [blue(picture) for picture in shown]
     assert abs(places[-1][0] - places[0][0]) > 60, "the robot drives to its charger"
     steps = [abs(after[0] - before[0]) for before, after in pairwise(places)]
-    assert max(steps) < 30, "and does not jump"
+    assert max(steps) < 40, "and does not jump"
 
 
 @pytest.mark.needs("egl")

@@ -1,10 +1,18 @@
-"""What stands in a file that shows a run: the film, as its script unpacks it."""
+"""What stands in a file that shows a run: the ticks, as its script unpacks them; of a film, its pictures."""
 
 import base64
 import gzip
 import json
 import re
+from pathlib import Path
 from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageSequence
+
+Picture = npt.NDArray[np.uint8]
 
 
 def film_of(text: str) -> dict[str, Any]:
@@ -28,3 +36,19 @@ def unset_in(film: dict[str, Any], name: str, tick: int) -> bool:
     """Whether nobody has set a variable by a tick."""
     level, _, variable = name.partition(".")
     return any(first <= tick <= last for first, last in film["variables"][level][variable]["unset"])
+
+
+def pictures(film: Path) -> list[Picture]:
+    """The pictures of a film, decoded."""
+    if film.suffix == ".mp4":
+        with av.open(str(film)) as opened:
+            return [frame.to_ndarray(format="rgb24").astype(np.uint8) for frame in opened.decode(video=0)]
+    with Image.open(film) as opened:
+        return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(opened)]
+
+
+def blue(picture: Picture) -> tuple[float, float]:
+    """Where the robot's blue is: the middle of its pixels, across and down."""
+    red, green, blue = (picture[:, :, part].astype(int) for part in range(3))
+    rows, columns = np.nonzero((blue > red + 50) & (blue > green + 25))
+    return float(columns.mean()), float(rows.mean())

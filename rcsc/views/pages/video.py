@@ -6,9 +6,10 @@ same run gives the same pictures.
 
 import io
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import accumulate
 from pathlib import Path
 
 import av
@@ -26,8 +27,14 @@ FRAMES_A_SECOND = 25
 WIDTH_PX, HEIGHT_PX = 800, 500
 LARGEST_PX, SMALLEST_PX = 15, 10
 """Of letters of the caption."""
-_BAND_PX, _BESIDE_PX = 30, 10
-_INK, _PAPER = (30, 36, 42), (246, 248, 250)
+MOST_SEEN = 200
+"""Moments that the eye is placed by."""
+_BAND_PX, _BESIDE_PX = 46, 14
+_INK, _SOFT, _PAPER = (30, 36, 42), (85, 96, 106), (246, 248, 250)
+Lines = Sequence[tuple[str, str]]
+"""Tables, each with the line that it ran."""
+Caption = tuple[tuple[str, str], ...]
+"""What stands beside each other below a picture: a name, and below it what is said of it."""
 
 
 @dataclass(slots=True)
@@ -36,11 +43,11 @@ class Frame:
 
     Attributes:
         poses: Seven numbers a body.
-        caption: What stands below it.
+        caption: What is said of it.
     """
 
     poses: "array[float]"
-    caption: str
+    caption: Caption
 
 
 @dataclass(slots=True)
@@ -56,69 +63,110 @@ class Filming:
     _first: int = -1
 
     def __call__(self, system: System, due: tuple[RunningLevel, ...]) -> None:  # noqa: ARG002  # as all who watch
-        """Keep the poses of a tick, for each picture of the film that shows it."""
+        """Take the tick that has just ended."""
         space = space_of(system.outside)
-        if space is None:
-            return
-        self._first = system.tick if self._first < 0 else self._first
-        tick_s = Fraction(system.description.tick_ms, 1000)
-        ends_s = (system.tick - self._first + 1) * tick_s
+        if space is not None:
+            lines = ((level.name, level.lines) for level in system.levels)
+            self.take(system.tick, system.description.tick_ms, lambda: array("f", space.poses()), lines)
+
+    def take(
+        self, tick: int, tick_ms: int, poses: Callable[[], "array[float]"], lines: Iterable[tuple[str, Lines]]
+    ) -> None:
+        """Keep a tick, for each picture of the film that shows it.
+
+        Args:
+            tick: One after the last that was taken.
+            tick_ms: How long one lasts.
+            poses: Gives where everything is after it.
+            lines: By level the tables and lines that it ran last.
+        """
+        self._first = tick if self._first < 0 else self._first
+        tick_s = Fraction(tick_ms, 1000)
+        ends_s = (tick - self._first + 1) * tick_s
         while len(self.frames) * Fraction(self.speed) / FRAMES_A_SECOND < ends_s:
-            self.frames.append(Frame(array("f", space.poses()), _caption(system, tick_s)))
+            self.frames.append(Frame(poses(), _caption(float(tick * tick_s), self.speed, lines)))
 
 
-def _caption(system: System, tick_s: Fraction) -> str:
-    """The time, and the line that each level ran last."""
-    lines = (
-        (level.name, " ".join(f"{table}: {line}" for table, line in level.lines if line))
-        for level in system.levels
+def _caption(at_s: float, speed: float, lines: Iterable[tuple[str, Lines]]) -> Caption:
+    """The time, with how fast it goes, and the line that each level ran last."""
+    ran = (
+        (name, ", ".join(f"{table}: {line}" for table, line in several if line)) for name, several in lines
     )
-    said = "   ".join(f"{name}  {line}" for name, line in lines if line)
-    return f"{float(system.tick * tick_s):.2f} s   {said}"
+    return (("time" if speed == 1 else f"{speed:g} times as fast", f"{at_s:.2f} s"), *ran)
 
 
-def write(path: Path, frames: list[Frame], space: Space, view: str) -> None:
-    """Photograph the frames, and write the film.
+def filmed(
+    form: str, frames: Sequence[Frame], space: Space, view: str, made: Callable[[int], None] = lambda _: None
+) -> bytes:
+    """Photograph the frames, and return the film.
 
     Args:
-        path: The file; its suffix is one of `FORMS`.
+        form: One of `FORMS`.
         frames: At least one.
-        space: Of the plant that ran.
+        space: Of the plant that ran; only its shapes are looked at.
         view: From where, as `camera.VIEWS` calls it.
+        made: Takes the number of pictures so far, before each.
+
+    Raises:
+        NoPictureError: Nothing draws here without a screen.
+    """
+    apart = -(-len(frames) // MOST_SEEN)
+    camera = Camera(
+        space, WIDTH_PX, HEIGHT_PX - _BAND_PX, view, within=[frame.poses for frame in frames[::apart]]
+    )
+    captions = _Captions(frames)
+
+    def pictures() -> Iterator[Image.Image]:
+        for number, frame in enumerate(frames):
+            made(number)
+            yield captions.below(Image.fromarray(camera.picture(frame.poses)), frame)
+
+    film = io.BytesIO()
+    try:
+        if form == ".mp4":
+            _mp4(film, pictures())
+        else:
+            _animated(film, pictures(), form.removeprefix("."))
+    finally:
+        camera.close()
+    return film.getvalue()
+
+
+def write(path: Path, frames: Sequence[Frame], space: Space, view: str) -> None:
+    """Write a film, whose form the suffix says.
 
     Raises:
         NoPictureError: Nothing draws here without a screen.
         OSError: The file cannot be written.
     """
-    camera = Camera(space, WIDTH_PX, HEIGHT_PX - _BAND_PX, view)
-    font = _font(max((frame.caption for frame in frames), key=len))
-    try:
-        pictures = (_with_caption(camera, frame, font) for frame in frames)
-        film = io.BytesIO()
-        if path.suffix == ".mp4":
-            _mp4(film, pictures)
-        else:
-            _animated(film, pictures, path.suffix.removeprefix("."))
-    finally:
-        camera.close()
-    write_atomically(path, film.getvalue())
+    write_atomically(path, filmed(path.suffix, frames, space, view))
 
 
-def _font(longest: str) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """The largest letters in which the longest caption has room."""
-    sizes = range(LARGEST_PX, SMALLEST_PX - 1, -1)
-    fonts = [ImageFont.load_default(size) for size in sizes]
-    return next((font for font in fonts if font.getlength(longest) <= WIDTH_PX - 2 * _BESIDE_PX), fonts[-1])
+class _Captions:
+    """Writes captions: a column for each part, as wide as the widest of it, so that nothing moves from one to the next."""
 
+    def __init__(self, frames: Sequence[Frame]) -> None:
+        """Args: frames: Of the film; their captions have the same parts."""
+        parts = [
+            {part for pair in column for part in pair}
+            for column in zip(*(frame.caption for frame in frames), strict=True)
+        ]
+        for size in range(LARGEST_PX, SMALLEST_PX - 1, -1):
+            self._font = ImageFont.load_default(size)
+            wide = [max(map(self._font.getlength, column)) + _BESIDE_PX for column in parts]
+            self._lefts = [_BESIDE_PX, *(_BESIDE_PX + at for at in accumulate(wide))]
+            if self._lefts[-1] <= WIDTH_PX:
+                break
 
-def _with_caption(
-    camera: Camera, frame: Frame, font: ImageFont.FreeTypeFont | ImageFont.ImageFont
-) -> Image.Image:
-    picture = Image.new("RGB", (WIDTH_PX, HEIGHT_PX), _PAPER)
-    picture.paste(Image.fromarray(camera.picture(frame.poses)), (0, 0))
-    middle = (_BESIDE_PX, HEIGHT_PX - _BAND_PX // 2)
-    ImageDraw.Draw(picture).text(middle, frame.caption, fill=_INK, font=font, anchor="lm")
-    return picture
+    def below(self, picture: Image.Image, frame: Frame) -> Image.Image:
+        """Return a picture with the caption of its frame."""
+        whole = Image.new("RGB", (WIDTH_PX, HEIGHT_PX), _PAPER)
+        whole.paste(picture, (0, 0))
+        draw = ImageDraw.Draw(whole)
+        for left, (name, text) in zip(self._lefts, frame.caption, strict=False):  # the last is where they end
+            draw.text((left, HEIGHT_PX - 0.7 * _BAND_PX), name, fill=_SOFT, font=self._font, anchor="lm")
+            draw.text((left, HEIGHT_PX - 0.3 * _BAND_PX), text, fill=_INK, font=self._font, anchor="lm")
+        return whole
 
 
 def _mp4(to: io.BytesIO, pictures: Iterator[Image.Image]) -> None:

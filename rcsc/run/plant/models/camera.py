@@ -25,6 +25,9 @@ _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "mesh": mujoco.mjtGeom.mjGEOM_MESH,
 }
+IN_PICTURE, LEAST_M, PLACINGS = 0.92, 0.4, 8
+"""The share of the picture that is filled; how near the eye comes; how often it is placed anew by what it saw."""
+_CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 _SKY = (0.93, 0.95, 0.97)
 
 
@@ -40,12 +43,15 @@ class Camera:
         width_px: Of a picture.
         height_px: Likewise.
         view: A name of `VIEWS`.
+        within: Poses at which all is to be in the picture; at least one.
 
     Raises:
         NoPictureError: No OpenGL draws here without a screen.
     """
 
-    def __init__(self, space: Space, width_px: int, height_px: int, view: str = "corner") -> None:
+    def __init__(
+        self, space: Space, width_px: int, height_px: int, view: str, within: Sequence[Sequence[float]]
+    ) -> None:
         self._model = _spec(space, width_px, height_px).compile()
         self._data = mujoco.MjData(self._model)
         self._opengl = _opengl(width_px, height_px)
@@ -53,7 +59,7 @@ class Camera:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
         self._scene = mujoco.MjvScene(self._model, maxgeom=2 * self._model.ngeom + 100)
         self._option, self._size = mujoco.MjvOption(), mujoco.MjrRect(0, 0, width_px, height_px)
-        self._eye = self._placed(space, view)
+        self._eye = self._placed(view, within)
 
     def picture(self, poses: Sequence[float]) -> npt.NDArray[np.uint8]:
         """Return the picture of these poses, seven numbers a body: rows from the top, columns, red green blue."""
@@ -76,18 +82,36 @@ class Camera:
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
 
-    def _placed(self, space: Space, view: str) -> Any:
-        """The eye, far enough to see all that has an end."""
-        self._pose(space.poses())
-        ended = [geom for geom in range(self._model.ngeom) if self._model.geom_rbound[geom] > 0]
-        at = self._data.geom_xpos[ended]
-        reach = self._model.geom_rbound[ended][:, None]
-        low, high = (at - reach).min(axis=0), (at + reach).max(axis=0)
+    def _placed(self, view: str, within: Sequence[Sequence[float]]) -> Any:
+        """The eye, as near as it sees at all these poses whatever has an end."""
+        corners = np.concatenate([self._corners(poses) for poses in within])
         eye = mujoco.MjvCamera()
-        eye.lookat[:] = (low + high) / 2
-        eye.distance = max(0.4, 0.9 * float(np.linalg.norm(high - low)))
         eye.azimuth, eye.elevation = VIEWS[view]
+        turn, rise = np.radians(eye.azimuth), np.radians(eye.elevation)
+        ahead = np.array((np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)))
+        right = np.array((np.sin(turn), -np.cos(turn), 0.0))
+        over = np.tan(np.radians(self._model.vis.global_.fovy) / 2) * IN_PICTURE
+        reach = np.array((over * self._size.width / self._size.height, over))
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        for _ in range(PLACINGS):
+            beside = (corners - middle) @ np.stack((right, np.cross(right, ahead)), axis=1)
+            depth = (corners - middle) @ ahead
+            eye.distance = max(LEAST_M, float((np.abs(beside) / reach - depth[:, None]).max()))
+            seen = beside / (eye.distance + depth)[:, None]
+            off = (seen.min(axis=0) + seen.max(axis=0)) / 2 * eye.distance
+            middle = middle + off[0] * right + off[1] * np.cross(right, ahead)
+        eye.lookat[:] = middle
         return eye
+
+    def _corners(self, poses: Sequence[float]) -> npt.NDArray[np.float64]:
+        """The corners of the boxes round all that has an end, in the room."""
+        self._pose(poses)
+        ended = np.flatnonzero(self._model.geom_rbound > 0)
+        boxes = self._model.geom_aabb[ended]
+        at = boxes[:, None, :3] + _CORNERS * boxes[:, None, 3:]
+        turns = self._data.geom_xmat[ended].reshape(-1, 3, 3)
+        room = np.einsum("gij,gcj->gci", turns, at) + self._data.geom_xpos[ended][:, None]
+        return np.asarray(room.reshape(-1, 3))
 
 
 def _opengl(width_px: int, height_px: int) -> Any:
