@@ -1,7 +1,9 @@
 """What the studio hands on: files that show what was, need nothing else, and run nothing that comes to stand in them."""
 
 import asyncio
+import base64
 import re
+import sys
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -10,12 +12,13 @@ from typing import Any
 import pytest
 
 from rcsc.desk.shell.opening import Opening
+from rcsc.desk.studio.server import Server
 from rcsc.desk.studio.share.document import of_film, player
 from rcsc.front.commands import run as rcsc
 from rcsc.views.pages.frame import hashed
 from tests.studio.driven import HIGH, WIDE, Seat, dock
 from tests.studio.served import Page, Refused, page, serving
-from tests.support.films import film_of, standing, values_at
+from tests.support.films import blue, film_of, pictures, standing, values_at
 
 OVERLAP = ("< 2500 || tick             | 400 ", "       || tick             | 400 ")
 HOSTILE = "</script><script>document.title = 'run'</script><img src=x onerror=\"document.title = 'run'\">"
@@ -26,13 +29,13 @@ Values = dict[tuple[int, str], dict[str, str]]
 
 def asked(system: Path, work: Callable[[Page], Any], script: str = "") -> Any:
     """What a page finds out of a studio."""
-
-    async def inside() -> Any:
-        async with page(server) as one:
-            return await work(one)
-
     with serving(Opening(system, script=script)) as server:
-        return asyncio.run(inside())
+        return asyncio.run(_with(server, work))
+
+
+async def _with(server: Server, work: Callable[[Page], Any]) -> Any:
+    async with page(server) as one:
+        return await work(one)
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +81,67 @@ def test_a_file_holds_every_value_of_every_tick_around_the_moment(ran: tuple[str
     for changes in (one["changes"] for level in film["variables"].values() for one in level.values()):
         assert all(before[1] != after[1] for before, after in pairwise(changes))  # changes alone
     assert len(values) == 82
+
+
+@pytest.mark.needs("egl")
+@pytest.mark.parametrize("form", ["mp4", "webp"])
+def test_the_run_so_far_is_filmed(form: str, tmp_path: Path) -> None:
+    """Without what was undone, and with the lines at which the levels stood."""
+    system = dock(tmp_path / "dock")
+    assert rcsc(["compile", str(system)]) == 0
+    asked_for = {"form": form, "speed": 4, "view": "corner"}
+
+    async def work(one: Page) -> tuple[Any, Any]:
+        await one.heard("run.state", open=True)
+        await one.ask("run.type", line="run 70")
+        await one.ask("run.type", line="undo 10")
+        for wrong in ({"form": "avi"}, {"speed": 0}, {"speed": 101}, {"view": "below"}):
+            with pytest.raises(Refused):
+                await one.ask("filmed.run", **asked_for | wrong)
+        one.progress.clear()
+        return await one.ask("filmed.run", **asked_for), list(one.progress)
+
+    answer, told = asked(system, work, script="dock.csv")
+    assert answer["name"] == f"dock.{form}"
+    film = tmp_path / answer["name"]
+    film.write_bytes(base64.b64decode(answer["base64"]))
+    shown = pictures(film)
+    assert len(shown) == 16  # 61 ticks of 40 ms are 2.44 s, four times as fast 0.61 s of 25 pictures each
+    assert told[-1] | {"done": 0} == {"text": "pictures", "done": 0, "of": 16}
+    places = [blue(picture)[0] for picture in shown]
+    assert max(places) - min(places) > 60, "the robot drives to its charger"
+    assert (shown[0][-20:] != shown[-1][-20:]).any(), "time and lines stand below"
+
+
+def test_what_cannot_be_filmed_is_refused_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system = dock(tmp_path / "dock")
+    assert rcsc(["compile", str(system)]) == 0
+    asked_for = {"form": "mp4", "speed": 1, "view": "corner"}
+
+    async def work(one: Page) -> None:
+        await one.heard("run.state", open=True)
+        monkeypatch.setitem(sys.modules, "rcsc.views.pages.video", None)
+        with pytest.raises(Refused, match="is not installed") as missing:
+            await one.ask("filmed.run", **asked_for)
+        assert missing.value.helps == ["pip install 'rcsc[video]'"]
+        monkeypatch.undo()
+        monkeypatch.setattr("importlib.import_module", lambda _: object())
+        with pytest.raises(Refused, match="install libegl1") as undrawn:
+            await one.ask("filmed.run", **asked_for)
+        assert undrawn.value.code == "RCS708"
+        monkeypatch.undo()
+
+    asked(system, work)
+
+    async def alone(one: Page) -> None:
+        await one.heard("run.state", open=True)
+        with pytest.raises(Refused, match="a method `space`"):
+            await one.ask("filmed.run", **asked_for)
+
+    with serving(Opening(system, alone=True)) as server:
+        asyncio.run(_with(server, alone))
 
 
 @pytest.mark.needs("chromium")

@@ -18,7 +18,7 @@ from rcsc.desk.studio.runs.live import LANE, WATCHED, Live, Pace
 from rcsc.desk.studio.runs.logs import Logs
 from rcsc.desk.studio.runs.timeline import TimeLine
 from rcsc.desk.studio.scene import Drawer, Scene
-from rcsc.desk.studio.share.sharing import Findings, Moments
+from rcsc.desk.studio.share.sharing import Films, Findings, Moments
 from rcsc.desk.studio.tables.desk import Desk
 from rcsc.desk.studio.tables.editing import Tables
 from rcsc.desk.studio.tables.proving import Graphs, Proof
@@ -71,6 +71,7 @@ def concerns(
         cell,
         Plots(time, hub),
         Moments(hub, time, cell),
+        Films(hub, time, cell),
         Findings(desk),
         Required(opening.path, kept),
     )

@@ -140,6 +140,16 @@ class Scene(Concern):
         tick = ask.body.whole("tick", history.first, history.last)
         return {"tick": tick, **self.drawing(tick, projected=ask.body.flag("projected"))}
 
+    def kept(self) -> tuple[Space, Poses]:
+        """Return what stands outside, and a copy of its poses that are kept.
+
+        Raises:
+            Refused: There is none, with the reason.
+        """
+        if self._space is None or self._time.source.log is not None:
+            raise Refused(Code.STUDIO, NO_POSES if self._space else self._why)
+        return self._space, Poses(self._poses.ticks[:], self._poses.packed[:])
+
     def drawing(self, tick: int, *, projected: bool) -> dict[str, Any]:
         """Draw a tick of the run that everybody looks at: `svg`, and `caption`, a sentence each.
 
