@@ -7,8 +7,10 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import pytest
 
@@ -200,6 +202,25 @@ def test_tables_and_page_say_the_same_and_nothing_in_a_name_is_markup(door: Path
     assert f"{case['first']}-{case['last']}" in html
     assert '<span class="at">door.rcs:</span><wbr><span class="at">12</span>' in html
     assert page((), ()).startswith("<!doctype html>")
+    assert "<td></td>" not in html, "what there is nothing of says so"
+
+
+def test_every_place_leads_to_its_line(door: Path) -> None:
+    assert run(["compile", "-q", str(door), "--out", "generated"]) == 0
+    run(["trace", str(door), "-q", "--no-vectors", "--anew"])
+    html, texts = (Path(f"trace/{name}.html").read_text(encoding="utf-8") for name in ("trace", "texts"))
+    led = {unquote(place) for place in re.findall(r'href="texts.html#([^"]*)"', html)}
+    lines = dict(re.findall(r'<span id="([^"]+:\d+)">(.*?)</span>', texts))
+    assert led <= set(lines)
+    assert len(led) > 20
+    first = next(
+        row for row in csv.DictReader(io.StringIO(Path("trace/code.csv").read_text(encoding="utf-8")))
+    )
+    assert f"{first['file']}:{first['first']}" in led
+    assert (
+        unescape(lines["c/door.c:1"])
+        == Path("generated/c/door.c").read_text(encoding="utf-8").splitlines()[0]
+    )
 
 
 @pytest.mark.needs("chromium")

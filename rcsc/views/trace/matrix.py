@@ -135,6 +135,7 @@ class Matrix:
         places: File and line of tables, variables, types and levels, by sort and name.
         pieces: Of all generated files, in order.
         untraced: Lines of generated files that come from nothing, as `file:line`.
+        texts: Of generated files and of tables, by the paths that places have.
     """
 
     program: str
@@ -148,6 +149,7 @@ class Matrix:
     pieces: tuple[Piece, ...]
     untraced: tuple[str, ...]
     places: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
 
     def answers(self, origin: Origin) -> tuple[str, ...]:
         """Give the requirements that code of an origin answers: its own, and those of all that runs it."""
@@ -210,19 +212,27 @@ def matrix(plan: Plan, known: ProgramFacts) -> Matrix:
     files = rendered(plan)
     code, pieces = _code(files, ".c", ".h", ".py")
     build = _Build(plan, known)
+    lines, places = tuple(build.lines()), dict(build.places())
     return Matrix(
         plan.program.name,
         plan.source,
         digest(plan.program),
         _hashed(files),
         known.tables,
-        tuple(build.lines()),
+        lines,
         tuple(build.declared()),
         {str(table.table.name): table.table.requirements for table in plan.tables},
         pieces,
         tuple(untraced(code, pieces)),
-        dict(build.places()),
+        places,
+        code | _tables_of((*(line.place for line in lines), *places.values()), known.sources),
     )
+
+
+def _tables_of(places: Iterable[str], sources: Mapping[str, Source]) -> dict[str, str]:
+    """Return the texts of the files that places stand in, by their paths."""
+    files = dict.fromkeys(place.rpartition(":")[0] or place for place in places)
+    return {file: sources[file].text for file in files if file in sources}
 
 
 def of_system(system: Linked, source: str) -> Matrix:
@@ -231,7 +241,7 @@ def of_system(system: Linked, source: str) -> Matrix:
     code, pieces = _code(files, ".c", ".h")
     hashed = _hashed(files)
     return Matrix(name, source, digest(*sorted(hashed.values())), hashed, {}, (), (), {}, pieces, tuple(untraced(code, pieces)),
-        {(Sort.SYSTEM, name): source})  # fmt: skip
+        {(Sort.SYSTEM, name): source}, code)  # fmt: skip
 
 
 def _hashed(files: Mapping[str, Rendered]) -> dict[str, str]:

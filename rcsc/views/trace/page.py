@@ -1,4 +1,4 @@
-"""A matrix as one page: it needs no script and no other file, is dark where the reader's screen is, and prints.
+"""A matrix as a page, and the texts that its places lead to as another: without a script, dark where the reader's screen is, to be printed.
 
 In: matrices. Out: HTML.
 """
@@ -6,6 +6,7 @@ In: matrices. Out: HTML.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby
+from urllib.parse import quote
 
 from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
@@ -29,6 +30,10 @@ code { font: .95em ui-monospace, monospace; }
 .soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
 .for { color: var(--accent); font-weight: 600; } a { color: inherit; }
 .at { white-space: nowrap; }
+.text { counter-reset: line; margin: 0; padding: .4rem 0; font: 12px/1.45 ui-monospace, monospace; overflow-x: auto; }
+.text span { display: block; }
+.text span::before { counter-increment: line; content: counter(line); display: inline-block; width: 4em; color: var(--soft); }
+.text :target { background: var(--lit); color: var(--lit-ink); }
 nav a { margin-right: 1rem; }
 tr:target { outline: 2px solid var(--accent); }
 @media print {
@@ -44,6 +49,7 @@ _ABOUT = (
     "the tables say what is required is another matter: for a requirement of a property its verdict says so, of every run; tests of "
     "requirements are scripts of orders (<code>rcsc run</code>) and watched episodes (<code>rcsc campaign</code>), which are kept apart."
 )
+NONE, NOT_MADE = '<span class="soft">none</span>', '<span class="soft">not made</span>'
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -58,6 +64,32 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
         *(part for one in matrices for part in _program(one)),
     ]
     return framed("Traceability", body)
+
+
+TEXTS = "texts.html"
+"""The page of texts, beside that of the matrix."""
+
+
+def texts_page(matrices: Sequence[Matrix]) -> str:
+    """Return the texts of tables and generated files, each line a place that the matrix leads to."""
+    texts = {path: text for one in matrices for path, text in one.texts.items()}
+    body = ["<h1>Texts</h1>", "<p>Tables, and the code that is made of them, as they were traced.</p>"]
+    links = (f'<a href="#{escape(quote(path))}">{escape(path)}</a>' for path in texts)
+    body.append(f"<nav>{''.join(links)}</nav>")
+    for path, text in texts.items():
+        lines = "".join(
+            f'<span id="{escape(path)}:{at}">{escape(line) or " "}</span>'
+            for at, line in enumerate(text.splitlines(), 1)
+        )
+        body += [f'<h2 id="{escape(path)}">{escape(path)}</h2>', f'<pre class="text">{lines}</pre>']
+    return framed("Texts", body)
+
+
+def _led(matrix: Matrix, path: str, line: int | str, shown: str) -> str:
+    """Return what is shown of a place, as a link to its line where its text is there."""
+    if path not in matrix.texts:
+        return shown
+    return f'<a href="{TEXTS}#{escape(quote(path))}:{line}">{shown}</a>'
 
 
 def framed(title: str, body: Iterable[str]) -> str:
@@ -104,11 +136,20 @@ def _requirements(known: Mapping[str, Sequence[Standing]], listed: Sequence[str]
         note = ' <span class="bad">not in the list</span>' if listed and name not in listed else ""
         head = f'<span class="for">{escape(name)}</span>{note}'
         if name not in known:
-            rows.append(row(head, '<span class="bad">nothing is for it</span>', "", "", ""))
+            rows.append(row(head, '<span class="bad">nothing is for it</span>', NONE, NONE, NONE))
         for at, one in enumerate(known.get(name, ())):
-            verdict = listing([one.verdict], "bad" if one.refuted else "")
+            verdict = (
+                f'<span class="bad">{_spoken(one.verdict)}</span>' if one.refuted else _spoken(one.verdict)
+            )
+            tests, shown = escape(one.tests) or NOT_MADE, escape(one.coverage) or NOT_MADE
             rows.append(
-                row("" if at else head, escape(one.place), verdict, escape(one.tests), escape(one.coverage))
+                row(
+                    f'<span class="soft">{escape(name)}</span>' if at else head,
+                    escape(one.place),
+                    verdict,
+                    tests,
+                    shown,
+                )
             )
     yield tabled({"requirement": 18, "named by": 26, "verdict": 34, "tests": 9, "coverage": 13}, rows)
 
@@ -121,7 +162,7 @@ def _program(matrix: Matrix) -> Iterator[str]:
         rests = ", ".join(f"{one} ({was})" for one, was in proof.rests)
         known = f"{proof.verdict}: {proof.method}{f'; rests on {rests}' if rests else ''}"
         matched = [("matched in", matrix.of(Origin(Sort.TABLE, name)))]
-        code = "; ".join(_where(matched, ends) for ends in ((".c",), (".py",)))
+        code = "; ".join(_where(matrix, matched, ends) for ends in ((".c",), (".py",)))
         names = listing([", ".join(matrix.requirements.get(name, ()))], "for")
         yield f"<h3>Table {escape(name)} {names}</h3>"
         yield f"<p>{escape(known)}.<br>{code}.</p>"
@@ -132,7 +173,7 @@ def _program(matrix: Matrix) -> Iterator[str]:
     if matrix.declared:
         yield "<h3>Procedures, assumptions, invariants and properties</h3>"
         widths = {"what": 16, "for": 10, "states": 30, "used by": 26, "known": 18}
-        yield tabled(widths, map(_declared, matrix.declared))
+        yield tabled(widths, (_declared(matrix, one) for one in matrix.declared))
     yield from _code(matrix)
 
 
@@ -152,25 +193,34 @@ def _line(matrix: Matrix, line: TracedLine) -> str:
     proved = [*line.findings, *([f"properties: {spoken}"] if spoken else [])]
     shown = f"{tests.shown} of {tests.conditions}" if tests.conditions else ""
     return row(
-        f'<b>{escape(line.name)}</b><br><span class="soft">{_place(line.place.rpartition("/")[2])}</span>',
-        listing(line.requirements, "for"),
-        listing([*line.states]) + (f'<br><span class="soft">{listing(proved)}</span>' if proved else ""),
-        listing(line.does),
-        _where(code, (".c",)),
-        _where(code, (".py",)),
-        _numbered("show", tests.made) + _numbered("take", tests.taken),
-        shown + (f'<br><span class="soft">{listing(tests.unshown)}</span>' if tests.unshown else ""),
+        f'<b>{escape(line.name)}</b><br><span class="soft">{_place(matrix, line.place, short=True)}</span>',
+        listing(line.requirements, "for") or NONE,
+        (listing([*line.states]) or NONE)
+        + (f'<br><span class="soft">{listing(proved)}</span>' if proved else ""),
+        listing(line.does) or NONE,
+        _where(matrix, code, (".c",)) or NONE,
+        _where(matrix, code, (".py",)) or NONE,
+        _numbered("show", tests.made) + _numbered("take", tests.taken) or NOT_MADE,
+        (shown or NOT_MADE)
+        + (f'<br><span class="soft">{listing(tests.unshown)}</span>' if tests.unshown else ""),
         name=f"{matrix.program}-{line.table}-{line.name}",
     )
 
 
-def _place(place: str) -> str:
-    """Return a place that breaks between folders, file and number, never in one of them."""
+def _place(matrix: Matrix, place: str, *, short: bool = False) -> str:
+    """Return a place that breaks between folders, file and number, never in one of them, and leads to its line; short: without folders."""
     file, colon, number = place.rpartition(":")
-    file, number = (f"{file}:", number) if colon and number.isdigit() else (place, "")
+    file, number = (file, number) if colon and number.isdigit() else (place, "")
     *folders, name = file.split("/")
-    pieces = (*(f"{folder}/" for folder in folders), name, number)
-    return "<wbr>".join(_unbroken(piece) for piece in pieces if piece)
+    last = f"{name}:" if number else name
+    pieces = (*(f"{folder}/" for folder in folders if not short), last, number)
+    return _led(matrix, file, number or 1, "<wbr>".join(_unbroken(piece) for piece in pieces if piece))
+
+
+def _spoken(text: str) -> str:
+    """Return a sentence whose names stand in backticks, with these set apart."""
+    parts = escape(text).split("`")
+    return "".join(f"<code>{part}</code>" if at % 2 else part for at, part in enumerate(parts))
 
 
 def _unbroken(words: str) -> str:
@@ -190,24 +240,24 @@ def _numbered(word: str, numbers: Sequence[int]) -> str:
     return f'<div><span class="soft">{word}</span> {", ".join(words)}</div>' if runs else ""
 
 
-def _where(code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...]) -> str:
+def _where(matrix: Matrix, code: Iterable[tuple[str, tuple[Piece, ...]]], ends: tuple[str, ...]) -> str:
     """Return the places of a line's code, the words before them soft; what only numbers it is left out."""
     rows = []
     for word, pieces in code:
         for file, runs in spots(piece for piece in pieces if piece.file.endswith(ends)):
-            lines = ", ".join(_unbroken(f"{first}-{last}") for first, last in runs)
+            lines = ", ".join(_led(matrix, file, first, _unbroken(f"{first}-{last}")) for first, last in runs)
             name = _unbroken(f"{file.rpartition('/')[2]}:")
             rows.append(f'<span class="soft">{word}</span> {name} {lines}')
     return "<br>".join(rows)
 
 
-def _declared(one: Declared) -> str:
+def _declared(matrix: Matrix, one: Declared) -> str:
     return row(
-        f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(one.place)}</span>',
-        listing(one.requirements, "for"),
-        escape(one.states),
-        escape(", ".join(one.used)),
-        escape(one.proof),
+        f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(matrix, one.place)}</span>',
+        listing(one.requirements, "for") or NONE,
+        _spoken(one.states) or NONE,
+        escape(", ".join(one.used)) or NONE,
+        _spoken(one.proof) or NONE,
     )
 
 
@@ -230,9 +280,14 @@ def _piece(matrix: Matrix, same: list[Piece]) -> str:
     named = ", ".join(names) if len(names) < 4 else f"{names[0]}, {names[1]} and {len(names) - 2} more"
     words = escape(origin.words)
     return row(
-        _unbroken(f"{same[0].first}-{max(piece.last for piece in same)}"),
-        f"<code>{escape(named)}</code>" if named else "",
+        _led(
+            matrix,
+            same[0].file,
+            same[0].first,
+            _unbroken(f"{same[0].first}-{max(piece.last for piece in same)}"),
+        ),
+        f"<code>{escape(named)}</code>" if named else NONE,
         f'<span class="soft">infrastructure: {words}</span>' if origin.sort is Sort.INFRASTRUCTURE else words,
-        _place(matrix.place(origin)),
-        listing(matrix.answers(origin), "for"),
+        _place(matrix, matrix.place(origin)) or NONE,
+        listing(matrix.answers(origin), "for") or NONE,
     )

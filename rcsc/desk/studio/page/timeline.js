@@ -108,7 +108,7 @@ export function mount(root, bus) {
       stands = now;
       Object.assign(still, { width: canvas.width, height: canvas.height });
       const on = begun(still, ratio);
-      axis(on, wide, high, say, run?.tick_ms ?? 40);
+      if (tracks.last > tracks.first) axis(on, wide, high, say, run?.tick_ms ?? 40); // before the first cycle there is no time to draw
       levels.forEach((level, row) => track(on, level, AXIS + ROW * row, wide, say));
       marks(on, high, say);
     }

@@ -35,7 +35,7 @@ Exit status: 0 all is traced, 1 findings, 2 usage.""",
 )
 @PATHS
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("trace"), metavar="FOLDER", show_default=True,
-              help="Where the files go: trace.html, trace.json, lines.csv, code.csv, requirements.csv.")  # fmt: skip
+              help="Where the files go: trace.html with texts.html, trace.json, lines.csv, code.csv, requirements.csv.")  # fmt: skip
 @click.option("--find", "asked", multiple=True, metavar="WHAT",
               help="Answer on the terminal, and write nothing: a place (FILE:LINE) of generated code or of a table, a name in C, "
               "`TABLE LINE`, a procedure, a requirement. May be given several times.")  # fmt: skip
