@@ -2,6 +2,7 @@
 
 import { make, Refusal } from "../bus.js";
 import { spoken } from "../make.js";
+import { finder, overview } from "./about.js";
 import { deskOf, SIGNS } from "./desk.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -22,7 +23,8 @@ export function mount(root, bus) {
   const all = make("button", { type: "button", title: "Shut or open every composite state", onclick: () => shutAll() }, "Shut all");
   const place = make("div", { class: "graph-place", "data-keys": "own", tabindex: "-1" });
   const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
-  root.append(make("div", { class: "bar" }, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, proof, words), place, whole);
+  const map = overview(place), find = finder(place, (text) => say(text), () => map.draw());
+  root.append(make("div", { class: "bar" }, find.field, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, proof, words), make("div", { class: "graph-room" }, place, map.canvas), whole);
 
   let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [], drawn = null;
   const shut = new Map(); // by file and table: a set
@@ -89,6 +91,7 @@ export function mount(root, bus) {
     all.textContent = hidden().size ? "Open all" : "Shut all";
     if (held) place.querySelector(`[data-focus="${CSS.escape(held)}"]`)?.focus({ preventScroll: true });
     marks();
+    find.again();
   }
 
   function rowsOf(parent, box, arrow = null) {
@@ -129,7 +132,7 @@ export function mount(root, bus) {
     const [x, y] = box.corner, [width, height] = box.size;
     if (box.kind === "begin") return put("g", { class: "begin" }, put("circle", { class: "tip", cx: x + width / 2, cy: y + height / 2, r: width / 2 }, put("title", {}, "here the table begins")));
     const group = put("g", { class: `box ${box.kind}`, "data-name": box.name });
-    const words_ = box.kind === "shut" ? "shut composite state: open it" : `state ${box.name}`;
+    const words_ = box.kind === "shut" ? `shut composite state of ${box.states.join(", ")}: open it` : `state ${box.name}`;
     const head = put("g", { tabindex: "0", role: "button", class: "state", "data-focus": `state ${box.name}`, "data-state": box.kind === "state" ? box.name : null, "aria-label": box.kind === "any" ? "any state" : words_ },
       put("rect", { x, y, width, height, rx: 7 }));
     head.addEventListener("focusin", () => say(box.rows.map(({ whole: text }) => text).join("\n")));
@@ -184,6 +187,7 @@ export function mount(root, bus) {
     }
     const runs = levels.map((level) => `${level.level} is in ${level.now?.[shown?.state] ?? "?"}, line ${(level.lines ?? []).join(" and ") || "none"}`);
     if (shown) tellBeside(...runs, ...said);
+    map.draw();
   }
   bus.on("selection", (_, changed) => {
     marks();
@@ -209,6 +213,7 @@ export function mount(root, bus) {
     if (!svg || !shown) return;
     svg.setAttribute("width", shown.width * scale);
     svg.setAttribute("height", shown.height * scale);
+    map.draw();
   }
   /** Larger or smaller; what stands at a point of the page stays there: what has the focus, or the middle. */
   function zoom(by, at = null) {
@@ -327,7 +332,7 @@ export function mount(root, bus) {
       done();
       if (from && focus.dataset.state) finish(focus.dataset.state);
       else focus.dispatchEvent(new MouseEvent("click", { bubbles: true }));
-    } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); } else if (event.key === "f" && !event.ctrlKey) { done(); fitted(); }
+    } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); } else if (event.key === "f" && !event.ctrlKey) { done(); fitted(); } else if (event.key === "/") { done(); find.field.focus(); }
   });
 
   /** Go to what is next in a direction; only to states while an arrow is drawn. */
@@ -357,7 +362,7 @@ export function mount(root, bus) {
   }
 
   desk.on(() => { proved(); ask(); });
-  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"]]) {
+  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"], ["/", "Find a state or a line: Enter the next, Shift+Enter the one before"]]) {
     bus.keys.push({ keys: `In the graph: ${keys}`, what, run: () => {}, where: "Graph" });
   }
   return { shown: () => { ask(); marks(); } };
