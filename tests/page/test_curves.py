@@ -56,10 +56,10 @@ def test_it_is_not_played_while_it_runs(seat: Seat) -> None:
     seat.write("run 5000")
     seat.press("enter", "escape")
     seat.until("#state", "runs at cycle")
-    assert seat.value(f"{seat.button('▶ Play')}.disabled")
+    assert seat.value(f"{seat.button('Play')}.disabled")
     seat.press("k", "space")
     seat.until("#state", "paused at cycle")
-    assert not seat.value(f"{seat.button('▶ Play')}.disabled")
+    assert not seat.value(f"{seat.button('Play')}.disabled")
 
 
 def test_time_line_and_all_curves_show_the_same_ticks(seat: Seat) -> None:

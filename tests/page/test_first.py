@@ -75,7 +75,8 @@ def test_space_runs_and_pauses_from_a_cell_of_the_grid_too(docks: Path) -> None:
     with seated(Opening(docks)) as seat:
         seat.until("#state", "paused at cycle 0")
         seat.press("2")
-        seat.wait("document.querySelector('.sheet td')")
+        seat.choose(".table-choice", "dock ")  # and not the table that runs, which may be another in a moment
+        seat.wait("document.querySelectorAll('.sheet td[data-line]').length > 10")
         seat.click('.sheet td[data-line="1"][data-column="0"]')
         before = seat.reads(".sheet tbody")
         seat.press("space")

@@ -150,7 +150,7 @@ def test_what_the_page_shows_is_so(repo: Path, tmp_path: Path) -> None:
     assert text.count("```sh\n") == len(shown(repo))
     assert len(played(repo, tmp_path, cross=False)) == 3
     for link in re.findall(r"\]\((?!#)([^)]+)\)", text):
-        assert (repo / "tables" / link).exists(), link
+        assert (repo / PAGE).parent.joinpath(link).exists(), link
 
 
 @pytest.mark.needs("arm-none-eabi-gcc")

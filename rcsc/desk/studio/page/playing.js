@@ -14,7 +14,7 @@ export function playing(bus, span) {
   const can = () => { const run = bus.latest("run"); return Boolean(run?.open) && !run.going && run.last > run.first; };
 
   function drawn() {
-    play.replaceChildren(frame ? "■ Stop " : "▶ Play ", make("kbd", {}, "k"));
+    play.replaceChildren(frame ? "Stop " : "Play ", make("kbd", {}, "k"));
     play.setAttribute("aria-pressed", Boolean(frame));
     play.disabled = !can();
     play.title = frame ? "Stop playing: k" : bus.latest("run")?.going ? "While it runs nothing is played: pause it first" : "Play what the time line shows, from the tick that is looked at: k";
