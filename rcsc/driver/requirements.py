@@ -155,18 +155,20 @@ def _of_level(its: Read, level: str, stated: Property, where: str) -> KnownRequi
     if its.known is None or verdict is KnownVerdict.UNKNOWN:
         return KnownRequirement(level, stated, where, "unknown", NOBODY_ASKED)
     closed = its.known.closed.get((level, key), UNKNOWN)
+    state = "refuted" if its.known.is_refuted(level, key) else _STATES[verdict]
     trusts = declared(closed.trusts)
     words = {
         "proved": f"proved under any timing{report.trusting(trusts)}",
         "conditional": f"rests on {report.named(its.known.lacking(level, key))}",
-        "open": "not proved: `rcsc prove` shows the shortest run against it, or says which runs were looked at",
-    }[_STATES[verdict]]
-    proved = _STATES[verdict] == "proved"
+        "refuted": "a run of the level breaks it: `rcsc prove` shows the shortest",
+        "open": "neither proved nor refuted: `rcsc prove` says which runs were looked at",
+    }[state]
+    proved = state == "proved"
     return KnownRequirement(
         level,
         stated,
         where,
-        _STATES[verdict],
+        state,
         words,
         "any" if proved else "",
         (level,),

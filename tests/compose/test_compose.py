@@ -334,7 +334,7 @@ def test_rcsc_prove_shows_the_trace_of_what_fails(capsys: pytest.CaptureFixture[
     assert run(["prove", str(SYSTEM), "--level", "upper", "--without-deferral"]) == 1
     said = capsys.readouterr()
     assert "monitored: not proved of the levels together" in said.out
-    assert "error[RCS751]: level `upper`, table `work`: not proved: assumption `in_step`" in said.err
+    assert "error[RCS751]: level `upper`, table `work`: refuted: assumption `in_step`" in said.err
     assert "broken in cycle 3" in said.err
     assert "work: 3" in said.err
 

@@ -560,7 +560,7 @@ def test_prove_shows_what_breaks_as_the_executors_ran_it(
     assert run(asked) == 1
     said = capsys.readouterr()
     assert re.search(r"property +goes_on +not proved", said.out)
-    assert "not proved: property `goes_on`" in said.err
+    assert "refuted: property `goes_on`" in said.err
     assert "it says: to_lower.input_command = go then to_lower.input_command = go" in said.err
     alone = (
         "broken in cycle 2 of level `upper` alone, as the interpreter, the Python and the C executors run it"

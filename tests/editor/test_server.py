@@ -105,7 +105,7 @@ def test_all_repairs_are_one_action(client: Client) -> None:
 
 
 def test_lens_status_and_command_say_the_same(client: Client) -> None:
-    """Of a failed table, one that rests on an assumption, a proved one, and one whose file is half written."""
+    """Of a refuted table, one that trusts an assumption, a proved one, and one whose file is half written."""
     seen = set()
     cases = [(GRIP, ""), ("task/acquire.rcs", ""), ("task/pause.rcs", ""), ("task/pause.rcs", "input x : ")]
     for name, more in cases:
@@ -116,7 +116,7 @@ def test_lens_status_and_command_say_the_same(client: Client) -> None:
         said = [lens["command"]["title"] for lens in lenses if lens["command"]["command"] == "rcsc.prove"]
         assert said == [table["text"] for table in status["tables"]]
         seen |= {table["state"] for table in status["tables"]}
-    assert seen == set(State)
+    assert seen == {State.PROVED, State.TRUSTING, State.STALE, State.REFUTED}
 
 
 def test_lenses_do_what_they_say(client: Client) -> None:
@@ -126,7 +126,7 @@ def test_lenses_do_what_they_say(client: Client) -> None:
     proved, graph, witness = (
         client.run(each["command"]["command"], *each["command"]["arguments"]) for each in lenses
     )
-    assert "failed" in proved["text"]
+    assert "refuted" in proved["text"]
     assert "decided by counting, confirmed by Z3" in proved["text"]
     assert witness["text"].startswith("input: reported = done, width_mm = 0\n0 of 4 lines match")
     assert "under `width_mm` stands `20 .. 40`, and it is 0" in witness["text"]
@@ -159,7 +159,7 @@ def test_hover_says_type_unit_range_writer_and_proof(client: Client) -> None:
     assert "written by `count`" in hovered("parts")
     assert "table `grip` in `wait`, `held`" in hovered("order", "| procedures")
     assert "1 of 3 of enum status" in hovered("executing", "| wait")
-    assert "**failed**" in hovered("grip", "table")
+    assert "**refuted**" in hovered("grip", "table")
     assert "6.31 %" in hovered("held", "| wait")
     assert "run by table `grip`" in hovered("count", "table")
     assert client.ask("textDocument/hover", client.at(GRIP, 0, 5)) is None
@@ -324,7 +324,7 @@ def test_who_does_not_ask_is_told(tables: Path) -> None:
         told, lambda each: any("closes the gap" in one["message"] for one in each["diagnostics"])
     )
     assert [each["code"] for each in gap["diagnostics"]] == ["RCS401"]
-    client.heard_ever("rcsc/status", lambda each: each["tables"][0]["state"] == "failed")
+    client.heard_ever("rcsc/status", lambda each: each["tables"][0]["state"] == "refuted")
     client.change(GRIP, text_of(client, GRIP).replace("20 .. 40", "0 .. 40"))
     client.heard_that(told, lambda each: each["version"] == 2 and each["diagnostics"] == [])
     client.heard_that("rcsc/status", lambda each: each["tables"][0]["state"] == "proved")

@@ -87,10 +87,10 @@ def test_the_rest_of_a_half_written_file_is_checked() -> None:
     answer = asked(workspace, text(b="in {", low="3"))
     assert not answer.whole
     assert [(each.table, each.meanwhile) for each in answer.findings] == [("first", False), ("second", True)]
-    assert states(answer) == {"first": State.FAILED, "second": State.FAILED}
+    assert states(answer) == {"first": State.ERRORS, "second": State.ERRORS}
     assert [len(each.witnesses) for each in answer.findings] == [0, 1]
     answer = asked(workspace, text(b="in {", low="4"))
-    assert states(answer) == {"first": State.FAILED, "second": State.STALE}
+    assert states(answer) == {"first": State.ERRORS, "second": State.STALE}
 
 
 LEVEL = """
@@ -177,7 +177,7 @@ def test_a_broken_file_that_is_used_leaves_the_rest(tmp_path: Path) -> None:
     answer = asked(Workspace(), written, user)
     found = [(Path(each.area.file).name, each.code[:4], each.meanwhile) for each in answer.findings]
     assert found == [("two.rcs", "RCS4", True), ("words.rcs", "RCS2", False)]
-    assert states(answer) == {"first": State.STALE, "second": State.FAILED}
+    assert states(answer) == {"first": State.STALE, "second": State.ERRORS}
 
 
 def test_open_texts_stand_for_files(tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ def test_open_texts_stand_for_files(tmp_path: Path) -> None:
     assert workspace.check(user).findings == ()
     workspace.close(words)
     Path(words).write_text("enum mode { off, on, broken }\n")
-    assert states(workspace.check(user))["first"] is State.FAILED
+    assert states(workspace.check(user))["first"] is State.REFUTED
     Path(words).unlink()
     assert not workspace.check(user).whole
     Path(words).write_bytes(b"\xff\xfe")
@@ -255,16 +255,11 @@ def test_standings_of_shipped_tables_are_their_verdicts(tmp_path: Path) -> None:
         for table in Workspace().check(file).tables:
             report = reports[table.name]
             rests = [was for _, was in report.assumptions if was != "proved"]
-            wanted = (
-                State.FAILED
-                if report.verdict is not Verdict.PROVED
-                else State.ASSUMED
-                if rests
-                else State.PROVED
-            )
+            proved = State.TRUSTING if rests else State.PROVED
+            wanted = proved if report.verdict is Verdict.PROVED else State(report.verdict.value)
             assert table.standing.state is wanted
             seen.add(wanted)
-    assert seen == {State.FAILED, State.ASSUMED, State.PROVED}
+    assert seen == {State.REFUTED, State.TRUSTING, State.PROVED}
 
 
 @pytest.mark.parametrize("verdict", [each for each in Verdict if each is not Verdict.PROVED])
@@ -275,4 +270,4 @@ def test_what_is_not_proved_is_not_called_so(verdict: Verdict) -> None:
 
 
 def test_an_error_in_a_table_fails_it_whatever_its_verdict() -> None:
-    assert standing(TableReport("t", "a.rcs", Verdict.PROVED, 1), ("it may overflow",)).state is State.FAILED
+    assert standing(TableReport("t", "a.rcs", Verdict.PROVED, 1), ("it may overflow",)).state is State.ERRORS

@@ -527,7 +527,7 @@ def test_a_proof_names_what_it_trusts_and_an_end_is_shown(
         "rests on that assumption `starts` can always be kept; that assumption `stops` can always be kept"
         in out
     )
-    assert "error[RCS761]: level `solo`: not proved: assumption `stops` can always be kept" in err
+    assert "error[RCS761]: level `solo`: refuted: assumption `stops` can always be kept" in err
     assert "and `starts`, which is about the same inputs: when speed = 0, within 2 cycles, rolls" in " ".join(
         err.split()
     )

@@ -218,7 +218,7 @@ def test_of_tables_alone_nothing_is_offered_that_runs(tmp_path: Path) -> None:
     shutil.copy(EXAMPLES.parent / "vocabulary.rcs", tmp_path)
     with seated(Opening(tmp_path / "system.toml", alone=True), first_time=True) as seat:
         seat.until("#about", "exactly one must match, whatever comes in")
-        seat.until(".standing", "failed")
+        seat.until(".standing", "refuted")
         shown = "[...document.querySelectorAll('#views button')].filter((one) => one.checkVisibility()).map(({ dataset }) => dataset.view)"
         assert seat.value(shown) == ["tables", "graph"]
         assert seat.value(PANES)[1][0], "one view has all the room"

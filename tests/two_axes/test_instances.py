@@ -251,7 +251,7 @@ def test_no_verdict_on_the_declared_values_is_taken_for_an_instance(
     assert rcsc([command, str(axes), *more]) == 1
     out, err = capsys.readouterr()
     said = out + err
-    assert "| lead.target_mm | 6" in said or "table `move`: not proved: some line matches" in said
+    assert "| lead.target_mm | 6" in said or "table `move`: refuted: some line matches" in said
     assert ("closes the gap" if command == "prove" else "with near = 7") in said
 
 

@@ -9,9 +9,12 @@
 
 local M = { known = {}, client = nil }
 
-local STATES = { "proved", "rests on an assumption", "stale", "failed" }
-local MARKS = { proved = "v", ["rests on an assumption"] = "~", stale = "?", failed = "x" }
-local GROUPS = { proved = "DiagnosticHint", ["rests on an assumption"] = "DiagnosticWarn", stale = "Comment", failed = "DiagnosticError" }
+local STATES = { "proved", "proved, trusting", "conditional", "stale", "undecided", "refuted", "has errors" }
+local MARKS = { proved = "v", ["proved, trusting"] = "~", conditional = "~", stale = "?", undecided = "x", refuted = "x", ["has errors"] = "x" }
+local GROUPS = {
+  proved = "DiagnosticHint", ["proved, trusting"] = "DiagnosticWarn", conditional = "DiagnosticWarn", stale = "Comment",
+  undecided = "DiagnosticError", refuted = "DiagnosticError", ["has errors"] = "DiagnosticError",
+}
 local SIGNS = vim.api.nvim_create_namespace("rcsc")
 
 local function root(file)

@@ -8,10 +8,11 @@ const vscode = require("vscode");
 const { LanguageClient, State } = require("vscode-languageclient/node");
 
 const LANGUAGE = "rcs";
-const STATES = ["proved", "rests on an assumption", "stale", "failed"];
-const MARKS = { proved: "\u2713", "rests on an assumption": "\u223c", stale: "?", failed: "\u2717" };
+const STATES = ["proved", "proved, trusting", "conditional", "stale", "undecided", "refuted", "has errors"];
+const MARKS = { proved: "\u2713", "proved, trusting": "\u223c", conditional: "\u223c", stale: "?", undecided: "\u2717", refuted: "\u2717", "has errors": "\u2717" };
 const COLOURS = {
-  proved: "testing.iconPassed", "rests on an assumption": "editorWarning.foreground", stale: "descriptionForeground", failed: "testing.iconFailed",
+  proved: "testing.iconPassed", "proved, trusting": "editorWarning.foreground", conditional: "editorWarning.foreground", stale: "descriptionForeground",
+  undecided: "testing.iconFailed", refuted: "testing.iconFailed", "has errors": "testing.iconFailed",
 };
 const ON_TABLE = ["rcsc.prove", "rcsc.graph", "rcsc.witness"];
 const IN_TABLE = ["rcsc.nextCell", "rcsc.previousCell", "rcsc.addRow", "rcsc.insertColumn"];
@@ -147,15 +148,15 @@ function gutter(state) {
   });
 }
 
-// The four states differ by their form, and not by colour alone.
+// Proved, proved of something, not looked at and not proved differ by their form, and not by colour alone.
+const FORMS = {
+  "\u2713": ["#388a34", "M3 8.5l3.5 3.5L13 4.5"],
+  "\u223c": ["#bf8803", "M2 9c2-4 4-4 6-1s4 3 6-1"],
+  "?": ["#808080", "M5.5 6a2.5 2.5 0 1 1 3.6 2.2c-.8.4-1.1.9-1.1 1.8M8 12.6v.6"],
+  "\u2717": ["#d0342c", "M4 4l8 8M12 4l-8 8"],
+};
 function icon(state) {
-  const forms = {
-    proved: ["#388a34", "M3 8.5l3.5 3.5L13 4.5"],
-    "rests on an assumption": ["#bf8803", "M2 9c2-4 4-4 6-1s4 3 6-1"],
-    stale: ["#808080", "M5.5 6a2.5 2.5 0 1 1 3.6 2.2c-.8.4-1.1.9-1.1 1.8M8 12.6v.6"],
-    failed: ["#d0342c", "M4 4l8 8M12 4l-8 8"],
-  };
-  const [colour, form] = forms[state];
+  const [colour, form] = FORMS[MARKS[state]];
   return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16"><path d="${form}" fill="none" stroke="${colour}" stroke-width="2" stroke-linecap="round"/></svg>`;
 }
 
@@ -289,7 +290,7 @@ async function check() {
 async function lenses(document, token, next) {
   const found = await next(document, token);
   for (const lens of found ?? []) {
-    const state = lens.command?.command === "rcsc.prove" ? STATES.find((each) => lens.command.title.startsWith(each)) : undefined;
+    const state = lens.command?.command === "rcsc.prove" ? STATES.find((each) => `${lens.command.title}:`.startsWith(`${each}:`)) : undefined;
     if (state) lens.command.title = `${MARKS[state]} ${lens.command.title}`;
   }
   return found;

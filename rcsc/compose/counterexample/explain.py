@@ -95,6 +95,11 @@ class Explanation:
         return self.obligation.sort is Sort.ENDS
 
     @property
+    def refutes(self) -> bool:
+        """Whether a run is shown that breaks it, as all that ran it say."""
+        return self.finding is not None and not self.beside and not self.warns
+
+    @property
     def bug(self) -> bool:
         """Whether it shows a fault of rcsc's own."""
         return bool(self.beside) and not self.guessed

@@ -2,7 +2,7 @@ r"""What an editor asks of tables while they are typed: findings, repairs, stand
 
 A `Workspace` holds texts that are open over the files on disk. Of a file it answers what `rcsc check` would say of these
 texts; of a text that is half written also what is found in the rest, with what is broken left out (`recovery`), marked
-*meanwhile*. Nothing that is found so is ever called proved: a table of a text that is not in order is *stale*, or *failed*.
+*meanwhile*. Nothing that is found so is ever called proved: a table of a text that is not in order is *stale*, or has errors.
 
 >>> workspace = Workspace()
 >>> workspace.open("/a.rcs", "input a : bool\ntable t {\n| line | a ||\n|------|---||\n| 1 | true ||\n}\n")
@@ -10,7 +10,7 @@ texts; of a text that is half written also what is found in the rest, with what 
 >>> [(finding.code, str(finding.area.start)) for finding in answer.findings]
 [('RCS401', '2:7')]
 >>> [str(table.standing) for table in answer.tables]
-['failed: no line of table `t` matches 1 of 2 (50 %) of the inputs']
+['refuted: no line of table `t` matches 1 of 2 (50 %) of the inputs']
 >>> [repair.title for repair in workspace.repairs(answer.findings[0])]
 ['add a line to table `t` for all of the inputs that no line matches']
 

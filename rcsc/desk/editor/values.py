@@ -14,9 +14,12 @@ class State(StrEnum):
     """The state of a table's proof, in the words that every view shows."""
 
     PROVED = "proved"
-    ASSUMED = "rests on an assumption"
+    TRUSTING = "proved, trusting"
+    CONDITIONAL = "conditional"
     STALE = "stale"
-    FAILED = "failed"
+    UNDECIDED = "undecided"
+    REFUTED = "refuted"
+    ERRORS = "has errors"
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +182,7 @@ class Grid:
 # --- the state of a table ---
 
 BEING_PROVED = Standing(State.STALE, "it is being proved as it is now")
-GIVEN_UP = Standing(State.FAILED, "a bug in rcsc: nothing is proved of it as it is now")
+GIVEN_UP = Standing(State.UNDECIDED, "a bug in rcsc: nothing is proved of it as it is now")
 NEVER_LOOKED_AT = Standing(State.STALE, "the program that it belongs to is not in order")
 
 
@@ -187,8 +190,11 @@ def standing(report: TableReport | None, errors: Sequence[str], broken: str = ""
     """Return the state of a table: the one place that decides it, so that no two views disagree.
 
     - *proved*: exactly one line matches every input in the declared ranges, whatever else happens.
-    - *rests on an assumption*: the same, as long as something holds that is not proved.
-    - *failed*: an error stands in the table, or it was looked at and not proved.
+    - *proved, trusting*: the same, as long as what the tables declare as assumed of their inputs is so.
+    - *conditional*: the same, as long as something holds that is itself not proved.
+    - *refuted*: for some input no line matches, or several do.
+    - *undecided*: the solvers gave up.
+    - *has errors*: another error stands in the table.
     - *stale*: nobody has looked at it as it is now: the program that it belongs to is not in order, or is still being proved.
 
     Args:
@@ -196,20 +202,22 @@ def standing(report: TableReport | None, errors: Sequence[str], broken: str = ""
         errors: Messages of the errors that stand in the table.
         broken: The first error elsewhere, which keeps the table from being looked at.
     """
+    refuted = report is not None and report.verdict is Verdict.REFUTED
     if errors:
         more = f", and {len(errors) - 1} more" if len(errors) > 1 else ""
-        return Standing(State.FAILED, f"{errors[0]}{more}")
+        return Standing(State.REFUTED if refuted else State.ERRORS, f"{errors[0]}{more}")
     if report is None:
         return Standing(State.STALE, broken) if broken else NEVER_LOOKED_AT
     if report.verdict is Verdict.UNDECIDED:
-        return Standing(State.FAILED, "it could not be decided")
-    if report.verdict is Verdict.REFUTED:
-        return Standing(State.FAILED, "not exactly one line matches every input")
+        return Standing(State.UNDECIDED, "it could not be decided")
+    if refuted:
+        return Standing(State.REFUTED, "not exactly one line matches every input")
     claimed = [f"`{name}` is {was}" for name, was in report.assumptions if was != Declared.PROVED.value]
     if report.verdict is Verdict.CONDITIONAL and not any(was == NOT_PROVED for _, was in report.assumptions):
         claimed.append("what is wrong elsewhere does not happen")
     if claimed:
-        return Standing(State.ASSUMED, named(claimed))
+        conditional = report.verdict is Verdict.CONDITIONAL
+        return Standing(State.CONDITIONAL if conditional else State.TRUSTING, named(claimed))
     also = ", confirmed by Z3" if report.confirmed_by_z3 else ""
     return Standing(State.PROVED, f"exactly one line matches every input{also}")
 

@@ -40,7 +40,7 @@ from rcsc.lang.project import project_root, systems_above
 from rcsc.run.description import description
 from rcsc.views.trace.across import declared_across, of_lines
 from rcsc.views.trace.kept import against, kept, names_of
-from rcsc.views.trace.matrix import REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
+from rcsc.views.trace.matrix import OPEN, REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
 from rcsc.views.trace.page import TEXTS, page, texts_page
 from rcsc.views.trace.requirements import covered, findings, listed, of_scripts, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
@@ -54,7 +54,7 @@ _SAID = {
     KnownVerdict.PROVED: "proved of the levels together",
     KnownVerdict.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
     KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
-    KnownVerdict.NOT_PROVED: REFUTED,
+    KnownVerdict.NOT_PROVED: OPEN,
 }
 SURVIVES = "survives"
 """What becomes of a slip that nothing notices (`compose.coverage.slips`)."""
@@ -265,7 +265,8 @@ def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
             if own.get(key[2]) == file:
                 state = standing.of_obligation(level.name, key)
                 if state in _SAID:
-                    yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
+                    words = REFUTED if standing.is_refuted(level.name, key) else _SAID[state]
+                    yield key[2], f"{words}, {os.path.relpath(system)}"
 
 
 def _of_system(plans: dict[str, Plan], path: Path, its: Read | None, cache: Cache | None) -> Matrix:

@@ -34,7 +34,8 @@ from rcsc.run.link import Linked, rendered_system
 
 OWES_NOTHING = "proved: it owes nothing"
 KEPT = "proved: every cycle keeps it"
-REFUTED = "not proved: `rcsc prove` shows the shortest run against it"
+REFUTED = "refuted: `rcsc prove` shows the shortest run against it"
+OPEN = "open: neither proved nor refuted, `rcsc prove` says which runs were looked at"
 NOT_HERE = "not proved here: `rcsc prove` proves it of the levels together"
 
 

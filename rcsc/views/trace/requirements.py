@@ -15,7 +15,7 @@ from rcsc.base.diagnostics.source import Span
 from rcsc.base.host.files.read import text
 from rcsc.run.description import description
 from rcsc.run.orders.script import BadScript, tested_by
-from rcsc.views.trace.matrix import REFUTED, Declared, Matrix, Tests, TracedLine
+from rcsc.views.trace.matrix import Declared, Matrix, Tests, TracedLine
 
 
 def listed(path: Path) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ class Standing:
     @property
     def refuted(self) -> bool:
         """Whether it was found not to hold."""
-        return self.verdict.startswith((REFUTED, "refuted"))
+        return self.verdict.startswith("refuted")
 
 
 def standings(matrices: Iterable[Matrix]) -> dict[str, list[Standing]]:
@@ -211,5 +211,5 @@ def covered(known: Mapping[str, Sequence[Standing]], wanted: Sequence[str]) -> s
     false = sum(any(one.refuted for one in where) for where in placed)
     proved = sum(all(one.verdict.startswith("proved") for one in where) for where in placed)
     rest = len(placed) - proved - false
-    words = f"{proved} proved, {false} refuted, {rest} assumed or not proved here"
+    words = f"{proved} proved, {false} refuted, {rest} assumed, open or not proved here"
     return f"{len(placed)} of {len(wanted)} requirements have a place: {words}"

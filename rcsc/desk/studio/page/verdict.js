@@ -3,7 +3,7 @@
 import { make, spoken } from "./make.js";
 import { deskOf } from "./tables/desk.js";
 
-const NOT = { refuted: ["wrong", "refuted"], open: ["warn", "open"], conditional: ["warn", "proved under assumptions"], unknown: ["soft", "not asked"] }; // as the bar tells them, in this order
+const NOT = { refuted: ["wrong", "refuted"], open: ["warn", "open"], conditional: ["warn", "conditional"], unknown: ["soft", "not asked"] }; // as the bar tells them, in this order
 
 export function verdicts(bus, place, show) {
   const desk = deskOf(bus);
@@ -45,7 +45,7 @@ export function verdicts(bus, place, show) {
       ...errors.slice(0, 50).map((one) => item("wrong", [...spoken(one.message), make("span", { class: "soft" }, ` ${where(one)}`)], ["Go to it", () => seek(one)])),
       ...required.filter(({ state }) => state === "refuted").map((one) => item("wrong", named(one, "is refuted: a run breaks it"), one.log ? ["Show its run", () => run(one)] : prove)),
       ...required.filter(({ state }) => state === "open").map((one) => item("warn", named(one, "is open: neither proved nor refuted"), ["Read why", () => show("run").then(() => bus.tell("drawer", "required"))])),
-      ...required.filter(({ state }) => state === "conditional").map((one) => item("warn", named(one, `is proved, trusting ${one.trusts.join("; ")}`))),
+      ...required.filter(({ state }) => state === "conditional").map((one) => item("warn", named(one, `is conditional: ${one.words}`))),
       ...together(required.filter(({ state }) => state === "unknown"), (some) => item("soft", ["Nobody has asked yet whether ", ...names(some), ` ${some.length === 1 ? "holds" : "hold"} over time`], prove)),
       ...together(required.filter(({ state }) => state === "proved"), (some) => item("good", ["Proved for every run: ", ...names(some)], ["Read how", () => show("run").then(() => bus.tell("drawer", "required"))])),
       ...together(required.filter(({ state }) => state === "assumed"), (some) => item("warn", ["Taken for granted of what stands outside: ", ...names(some)])),

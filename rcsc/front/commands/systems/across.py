@@ -80,9 +80,9 @@ def check_names(names: Collection[str], systems: Mapping[str, TransitionSystem],
             raise click.UsageError(f"there is no requirement across levels `{name}`; {there}")
 
 
-def say_runs(systems: Mapping[str, TransitionSystem], given: Answers) -> None:
+def say_runs(systems: Mapping[str, TransitionSystem], given: Answers | None) -> None:
     """Print the run of each requirement that some run breaks, also where it is proved of kinder surroundings."""
-    for found, explanation in given.every:
+    for found, explanation in given.every if given is not None else ():
         if found.vacuous:
             say_error(
                 Code.VACUOUS,

@@ -64,7 +64,8 @@ def say_explanation(
         say_error(Code.ENDLESS, f"{where}: not shown: {explanation.obligation.shown}", "warning")
     else:
         code = Code.CANNOT_BE_KEPT if explanation.obligation.sort is Sort.KEPT else Code.NOT_COMPOSED
-        say_error(code, f"{where}: not proved: {explanation.obligation.shown}")
+        word = "refuted" if explanation.refutes else "not proved"
+        say_error(code, f"{where}: {word}: {explanation.obligation.shown}")
     if stated := _stated(systems, explanation):
         attach("note", f"it says: {stated}")
     for other in _of_the_same_inputs(systems, explanation):

@@ -33,6 +33,7 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.notices import notices
+from rcsc.compose.proof.standing import SystemOutline, keep_refuted
 from rcsc.compose.proof.system import (
     SystemProof,
     lines_in,
@@ -41,7 +42,7 @@ from rcsc.compose.proof.system import (
 )
 from rcsc.compose.together.left_open import whole_proof
 from rcsc.compose.together.repeated import Answers, answers
-from rcsc.driver.outline import keep_lines
+from rcsc.driver.outline import keep_lines, outline
 from rcsc.driver.requirements import Read
 from rcsc.driver.unchanged import digest_at
 from rcsc.front.commands.shared.options import cores
@@ -115,6 +116,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     """
     stood = digest_at(str(path))
     systems, loaded = read_systems(path)
+    outlined = outline(systems)
     sources = {file: source for files in loaded.values() for file, source in files.sources.items()}
     names = _known(asked.only, systems) or tuple(systems)
     programs = {spec.name: spec.program for spec in description(path).levels}
@@ -131,9 +133,9 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
     across.check_names(asked.required, systems, settings.system)
     effort = Effort(limits=Limits.of(asked.steps))
-    large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
     clock = Clock(cache, path)
     with _LevelProgress(names, clock, wanted=asked.progress) as done:
+        large = sum(lines_in(systems[name]) for name in names) >= _WORTH_PROCESSES
         jobs = asked.jobs or (cores() if large else 1)
         if asked.only or asked.variants:
             alone = proof = prove_transition_systems(systems, effort, jobs, names, done, cache)
@@ -159,9 +161,9 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         coverages = across.covered(systems, proof, settings, given, coverages)
     if not asked.as_json:
         _say(line for each in coverages.values() for line in lines_of(each, sources))
-    if given is not None and not asked.as_json:
         across.say_runs(systems, given)
     explanations = _explanations(path, systems, proof, asked, settings)
+    _keep_refuted(None if asked.begins else cache, outlined, explanations)
     if asked.as_json:
         found = [explanation_as_json(systems, explanation, settings) for explanation in explanations]
         _say(_lines(path, systems, proof, asked, sources, _More(found, coverages, given)))
@@ -170,9 +172,8 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     refused = _refused(systems, alone, quiet=asked.as_json) if asked.confirms else []
     if refused or any(explanation.bug for explanation in explanations) or across.beside(given):
         return 3
-    status = 0 if proof.proved and (proof.whole or not asked.strict) else 1
-    counts = across.counts(systems, proof, given)
-    status = max(status, summary(proof, counts).status(strict=asked.strict))
+    short = not proof.proved or (asked.strict and not proof.whole)
+    status = max(int(short), summary(proof, across.counts(systems, proof, given)).status(strict=asked.strict))
     quiet = not explanations and not asked.coverage and (given is None or not given.told)
     if cache is not None and not status and quiet:
         keep_lines(
@@ -564,6 +565,16 @@ def _explanations(
         place = str(error.filename or asked.logs)
         raise UnwritableError(place, error.strerror or "no reason given") from error
     return explanations
+
+
+def _keep_refuted(cache: Cache | None, outlined: SystemOutline, explanations: Sequence[Explanation]) -> None:
+    """Keep which claims were refuted: what the studio and `rcsc trace` say of them afterwards."""
+    if cache is None:
+        return
+    for level in outlined.levels:
+        broken = (each for each in explanations if each.refutes and each.level == level.name)
+        if keys := frozenset(each.obligation.key for each in broken):
+            keep_refuted(cache, level.content, keys)
 
 
 def run_cases(cases: tuple[Path, ...]) -> int:

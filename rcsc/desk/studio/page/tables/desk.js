@@ -3,7 +3,7 @@
 import { make, Refusal } from "../bus.js";
 import { spoken } from "../make.js";
 
-export const SIGNS = { proved: "✓", "rests on an assumption": "◑", stale: "…", failed: "✗" }; // beside the words
+export const SIGNS = { proved: "✓", "proved, trusting": "◑", conditional: "◑", stale: "…", undecided: "✗", refuted: "✗", "has errors": "✗" }; // beside the words
 
 const desks = new WeakMap();
 

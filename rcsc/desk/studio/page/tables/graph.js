@@ -353,7 +353,7 @@ export function mount(root, bus) {
   /** What is proved of the table; and, once, with the arrow that was drawn. */
   function proved() {
     const { state: now, why } = desk.shown?.standing ?? { state: "", why: "" };
-    proof.className = `graph-proof standing ${now.replaceAll(" ", "-")}`;
+    proof.className = `graph-proof standing ${now.replaceAll(/\W+/g, "-")}`;
     proof.replaceChildren(make("strong", {}, now && `${SIGNS[now] ?? ""} ${now}`));
     proof.title = why;
     if (!drawn || !desk.doc?.known || desk.doc.version < drawn.version) return;

@@ -67,7 +67,7 @@ export function mount(root, bus) {
     save.textContent = doc.dirty ? "Save *" : "Save";
     save.setAttribute("aria-label", doc.dirty ? "Save: there are changes" : "Save: nothing changed");
     const now = shown?.standing ?? { state: "stale", why: "the file has no table" };
-    standing.className = `standing ${now.state.replaceAll(" ", "-")}`;
+    standing.className = `standing ${now.state.replaceAll(/\W+/g, "-")}`;
     standing.replaceChildren(make("strong", {}, `${SIGNS[now.state] ?? ""} ${now.state}`), ": ", ...spoken(now.why));
     standing.title = `${now.state}: ${now.why}`;
     if (doc.known) {
