@@ -102,7 +102,7 @@ READERS_OF_FILES: Mapping[str, str] = {
     "rcsc/lang/syntax/parse.py": "comes with the compiler",
     "rcsc/desk/studio/server.py": "comes with the compiler",
     "rcsc/desk/studio/share/document.py": "comes with the compiler",
-    "rcsc/front/commands/new.py": "comes with the compiler",
+    "rcsc/front/commands/shared/scaffold.py": "comes with the compiler",
     "sim/rcsc_cell/cell/reach.py": "comes with the cell",
 }
 """Who may open something, and what."""

@@ -66,7 +66,7 @@ class Seat(Browser):
     def enter(self, address: str, *, dark: bool = False) -> None:
         """Open the studio, and wait until the page is there."""
         self.open(address, dark=dark)
-        self.wait("document.documentElement.dataset.ready === 'yes'")
+        self.wait("document.documentElement?.dataset.ready === 'yes'")
 
     def reads(self, selector: str) -> str:
         """The text of an element as it is read; empty where there is none."""

@@ -123,11 +123,19 @@ class Browser:
         return found["result"].get("value")
 
     def wait(self, expression: str) -> None:
-        """Waits until an expression is true."""
+        """Waits until an expression is true, also while another page comes."""
         until = time.monotonic() + PATIENCE_S
-        while not self.value(f"!!({expression})"):
+        while not self._is(expression):
             assert time.monotonic() < until, f"never: {expression}; the page said {self.said}"
             time.sleep(0.03)
+
+    def _is(self, expression: str) -> bool:
+        try:
+            return bool(self.value(f"!!({expression})"))
+        except AssertionError as error:
+            if "Inspected target navigated" not in str(error):
+                raise
+            return False
 
     def type(self, text: str) -> None:
         """Types into what has the focus, and presses Enter."""

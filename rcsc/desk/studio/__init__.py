@@ -16,8 +16,9 @@ and a line in `project`; a new view is a module of
 
 Nothing that a page sends is run or compiled but through the shell's commands and the prover. Who may see it: `rcsc.base.host.guard`.
 
-Modules, in the order the data flows: `server` talks to pages, `hub` has their questions answered, `project` says by whom; `build` has
-tables and levels proved in processes of their own, `required` lists requirements as they stand; `runs` is the running system and its time
-line, `tables` the open files with their grids, proof and graphs; `scene` shows what stands outside the levels, `plots` variables over
-time, `share` hands files on. The folder `page` is the page, `page/vendor` parts of others with their licences.
+Modules, in the order the data flows: `server` talks to pages, `hub` has their questions answered, `project` says by whom; `build`
+has tables and levels proved in processes of their own, `required` lists requirements as they stand; `runs` is the running system
+and its time line, `tables` the open files with their grids, proof and graphs; `scene` shows what stands outside the levels, `plots`
+variables over time, `share` hands files on; `start` says what else may be opened. The folder `page` is the page, `page/vendor`
+parts of others with their licences.
 """

@@ -41,11 +41,21 @@ class Build(Concern):
 
     name, lane = "build", LANE
 
-    def __init__(self, path: Path, hub: Hub, live: Live, agreement: Agreement) -> None:
-        """Args: path: Of the description; hub: Of the studio; live: What runs what was compiled; agreement: Whether it may run."""
+    def __init__(
+        self, path: Path, hub: Hub, live: Live, agreement: Agreement, *, proves: bool = False
+    ) -> None:
+        """Take what it works on.
+
+        Args:
+            path: Of the description.
+            hub: Of the studio.
+            live: What runs what was compiled.
+            agreement: Whether it may run.
+            proves: Whether the levels are proved together at once.
+        """
         self._path, self._hub, self._live, self._agreement = path, hub, live, agreement
         self._said: Json = {"doing": "", "asks": "", "system": path.is_file()}
-        self._over = threading.Event()
+        self._proves, self._over = proves, threading.Event()
         self._stop: Callable[[], None] = lambda: None
 
     def prove_first(self, ask: Ask, then: Callable[[], Json]) -> Json:
@@ -75,7 +85,8 @@ class Build(Concern):
             self._hub.do(RUN, lambda: self._live.close_because(ASKS))
             return
         try:
-            self._compile(None)
+            if self._compile(None)["ok"] and self._proves:
+                self._prove(None)
         except CancelledError:
             return  # the studio ends
         except BaseException as error:
@@ -166,6 +177,9 @@ class Build(Concern):
         """Prove the levels together, and keep counterexamples as logs."""
         if not self._path.is_file():
             raise Refused(Code.STUDIO, NO_SYSTEM)
+        return self._prove(ask)
+
+    def _prove(self, ask: Ask | None) -> Json:
         folder = self._path.parent / FOUND
         before = _logs(folder)
         arguments = ("prove", str(self._path), "--log", str(folder))

@@ -25,7 +25,7 @@ from rcsc.desk.studio.tables.proving import Graphs, Proof
 from rcsc.desk.studio.tables.writing import Writing
 
 
-def concerns(
+def concerns(  # noqa: PLR0913  # all that a studio is made of
     opening: Opening,
     hub: Hub,
     agreement: Agreement,
@@ -33,6 +33,8 @@ def concerns(
     pace: Pace = WATCHED,
     drawer: Drawer | None = None,
     first: Path | None = None,
+    *,
+    proves: bool = False,
 ) -> Sequence[Concern]:
     """Return all concerns of a studio.
 
@@ -44,12 +46,13 @@ def concerns(
         pace: How the system runs at first.
         drawer: Draws a tick of the cell, where somebody can.
         first: The file, or the folder, whose tables are shown first; else those of the system.
+        proves: Whether the levels are proved together at once.
     """
     live = Live(opening, hub.tell, lambda work, after_s: hub.do(LANE, work, after_s), pace)
     time = TimeLine(live, hub.tell)
     folders = tuple(dict.fromkeys((Path.cwd(), opening.path.resolve().parent)))
     kept = Logs(folders, tuple(logs), lambda *shown: hub.do(LANE, lambda: time.show(*shown)))
-    build = Build(opening.path, hub, live, agreement)
+    build = Build(opening.path, hub, live, agreement, proves=proves)
     live.prove_first = build.prove_first
     desk = Desk(opening.path, hub.tell, hub.do, first)
 

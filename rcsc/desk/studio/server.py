@@ -72,12 +72,12 @@ class Server:
         address: Of the page, once the server listens.
     """
 
-    def __init__(self, port: int = 0) -> None:
-        """Args: port: To listen on; 0 for a free one."""
+    def __init__(self, port: int = 0, token: str = "") -> None:
+        """Args: port: To listen on; 0 for a free one; token: Of the address; empty for a new one."""
         self.hub = Hub(self._soon)
         self.address = ""
         self._wanted, self._port = port, 0
-        self._token = secrets.token_urlsafe(24)
+        self._token = token or secrets.token_urlsafe(24)
         self._files = page_files()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over: asyncio.Event | None = None
@@ -100,6 +100,10 @@ class Server:
         """Stop serving; from any thread."""
         if self._over is not None:
             self._soon(self._over.set)
+
+    def again(self) -> "Server":
+        """Return a server for the same address, to be served once this one has ended."""
+        return Server(self._port, self._token)
 
     def _soon(self, work: Callable[[], None]) -> None:
         """Queue work in the server's thread; after the end, drop it."""

@@ -5,6 +5,7 @@ import { spoken } from "./make.js";
 import { followKeys } from "./keys.js";
 import { sharing } from "./share.js";
 import { Connected } from "./socket.js";
+import { followStart } from "./started.js";
 import { verdicts } from "./verdict.js";
 import { BELOW, DRAWER, VIEWS } from "./views.js";
 import { about } from "./welcome.js";
@@ -216,6 +217,7 @@ page("help").addEventListener("click", listKeys);
 bus.key("?", "List the keys", listKeys);
 bus.key("escape", "Leave a field: keys mean what they say here again", () => {});
 bus.key(".", "Cancel what is under way in the line below", () => bus.latest("said")?.cancel?.());
+bus.key("h", "The start page: other tables, new projects, published tables", () => location.assign("start.html"));
 bus.key("t", "Light, dark, or as the system has it", nextTheme);
 
 sharing(bus, page("share"), page("sharing"));
@@ -234,6 +236,7 @@ function offer() {
 
 verdicts(bus, page("verdict"), show);
 about(bus, page("about"), store, show);
+followStart(bus, ({ opened }) => { if (!opened) location.replace("start.html"); });
 bus.connect();
 const { system = true } = await first("build.state") ?? {};
 const kept = [0, 1].map((at) => VIEWS.find(({ name }) => name === store.get(`pane${at}`, "")));

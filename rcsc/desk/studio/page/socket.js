@@ -9,7 +9,7 @@ export class Connected extends Bus {
   #retry = 500;
 
   connect() {
-    const socket = new WebSocket(`ws://${location.host}${location.pathname}socket`);
+    const socket = new WebSocket(new URL("socket", location.href.replace(/^http/, "ws")));
     this.#socket = socket;
     socket.addEventListener("open", () => {
       this.#retry = 500;

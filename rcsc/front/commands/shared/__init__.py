@@ -17,5 +17,6 @@ which says what backs each table.
 Modules: `options` has the common options, `paths` the paths that must be there, `extras` the packages that the core leaves
 out, `stopped` how a command ends that cannot go on, `systems` what commands about a system need, `graphs` what `rcsc graph`
 and `rcsc table` do, `logs` what `rcsc log` and `rcsc replay` do, `cells` makes the paper's cell of a system's data, `show`
-puts a report out, `proved` says what `rcsc prove` found, `took` how long its parts took last time.
+puts a report out, `proved` says what `rcsc prove` found, `took` how long its parts took last time, `scaffold`
+makes a project of a template or of published tables.
 """

@@ -15,14 +15,12 @@ import click
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.children import scratch
 from rcsc.base.host.files.read import content, json_of
-from rcsc.base.host.trust import Agreement
 from rcsc.code.testing.figures import counted
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.stopped import Ending, Interrupted, Stopped, attach, say_error
 from rcsc.front.commands.shared.systems import COMPILES, DATABASE, EXECUTOR, PLANT, SYSTEM, made, meant
 from rcsc.front.commands.systems.studio import serve
-from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription, Description, description
 from rcsc.run.faults import faults_of, grades_of
 from rcsc.run.orders.operator import MOST_TICKS, UNORDERED_TICKS, WATCHED_RATE, Operator, ScriptedRun
@@ -184,7 +182,9 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         opening = Opening(
             path, kind, order.plant, order.script, seed=seed, database=order.database, faults=faults
         )
-        serve(opening, Agreement(Path(project_root(str(path))), given=True), runs_at=rate or WATCHED_RATE)
+        from rcsc.desk.studio.start import Next  # of an extra
+
+        serve(Next(opening, agreed=True), runs_at=rate or WATCHED_RATE)
         return 0
     paced = rate or (WATCHED_RATE if processes else None)
     again = _command(target, system, script, database, executor, plant)
