@@ -5,7 +5,9 @@ The oracle is one edit at a time.
 
 import hashlib
 import json
+import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,8 @@ import pytest
 import rcsc.front.commands.tables.evidence  # noqa: F401  # it reads the kinds there are, before a test has others
 from rcsc.front.commands import run
 from rcsc.views.evidence import collect as collecting
-from rcsc.views.evidence.kind import Evidence, Kind, Subject
+from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject
+from rcsc.views.pages.dossier_page import AcceptedPoint
 from tests.support.programs.texts import edit_file
 
 TABLE = """input a : int 0 .. 9
@@ -31,7 +34,15 @@ level l { table t }
 
 def looked(subject: Subject) -> Evidence:
     """A kind that says what it was given."""
-    return Evidence(("looked at",), {"seen.c": subject.files["c/a.c"]})
+    accepted = (
+        AcceptedPoint("10.4", "a.c:3", "it is <meant>"),
+        AcceptedPoint("10.4", "gone.c:3", "it is <meant>"),
+    )
+    return Evidence(("looked at",), {"seen.c": subject.files["c/a.c"]}, accepted=accepted)
+
+
+def answered(evidence: Evidence, _: Subject) -> Evidence:
+    return evidence
 
 
 @pytest.fixture
@@ -62,11 +73,65 @@ def test_the_record_has_every_file_and_how_it_was_made(project: Path) -> None:
     named = {**program["tables"], **program["code"]}
     named |= {f"evidence/{path}": digest for path, digest in program["reports"].items()}
     assert set(named) >= {"a.rcs", "generated/c/a.c", "generated/c/a.h", "evidence/a/misra/seen.c"}
-    for path, digest in {**named, "evidence/index.md": record["index"]}.items():
+    pages = {f"evidence/{path}": digest for path, digest in record["pages"].items()}
+    assert set(pages) == {"evidence/index.html", "evidence/texts.html"}
+    for path, digest in {**named, **pages}.items():
         assert hashlib.sha256((project / path).read_bytes()).hexdigest() == digest
-    index = (project / "evidence/index.md").read_text()
+    index = (project / "evidence/index.html").read_text()
     assert all(digest in index for path, digest in named.items() if path != "a.rcs")
     assert "Made 1984-10-26T00:00:00Z by Ada, with rcsc " in index
+
+
+def test_the_index_is_a_page_whose_places_lead_somewhere(project: Path) -> None:
+    """What is accepted stands with its reason; a place that no text has is no link; nothing in a reason is markup."""
+    assert made() == 0
+    index, texts = ((project / "evidence" / name).read_text() for name in ("index.html", "texts.html"))
+    assert "<td>10.4</td><td>it is &lt;meant&gt;</td>" in index
+    assert 'href="texts.html#generated/c/a.c:3">a.c:3</a>, gone.c:3</td>' in index
+    places = set(re.findall(r'href="texts\.html#([^"]+)"', index))
+    assert {"a.rcs:1", "generated/c/a.c:3", "generated/c/a.h:1"} <= places
+    assert all(f'id="{place}"' in texts for place in places)
+    files = re.findall(r'href="(a/[^"]+)"', index)
+    assert files
+    assert all((project / "evidence" / file).is_file() for file in files)
+    assert "<script" not in index
+
+
+def test_what_a_kind_lacks_or_cannot_show_stands_in_the_index(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lacks = Evidence((), shortfalls=(Shortfall("a.c:2", "nobody looked"),))
+    for evidence, told in (
+        (lacks, "lacks 1 point"),
+        (Evidence((), missing="no eye"), "shows nothing: no eye"),
+    ):
+        kind = Kind("looks", partial(answered, evidence))
+        monkeypatch.setattr(collecting, "KINDS", {"misra": kind})
+        assert made() == 1
+        assert told in (project / "evidence/index.html").read_text()
+
+
+def test_what_an_earlier_dossier_had_and_this_one_has_not_is_removed(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only what it wrote, as it wrote it: a user's own file, one that was changed, and what a record names elsewhere stay."""
+    names = ("old.txt", "changed.txt")
+    files = {"misra": Kind("looks", lambda _: Evidence((), dict.fromkeys(names, "seen")))}
+    monkeypatch.setattr(collecting, "KINDS", files)
+    assert made() == 0
+    folder = project / "evidence/a/misra"
+    (folder / "changed.txt").write_text("mine")
+    (folder / "own.txt").write_text("mine")
+    record = project / "evidence/index.json"
+    document = json.loads(record.read_text())
+    document["programs"][0]["reports"]["../a.rcs"] = hashlib.sha256(
+        (project / "a.rcs").read_bytes()
+    ).hexdigest()
+    record.write_text(json.dumps(document))
+    monkeypatch.setattr(collecting, "KINDS", {"misra": Kind("looks", looked)})
+    assert made() == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["changed.txt", "own.txt", "seen.c"]
+    assert (project / "a.rcs").is_file()
 
 
 def test_who_runs_it_is_asked_of_the_environment(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,7 +159,7 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "more C": (lambda at: (at / "generated/c/more.c").write_text(""), "`generated/c/more.c` is new"),
     "a report": (lambda at: (at / "evidence/a/misra/seen.c").write_text(""), "`evidence/a/misra/seen.c` differs"),
     "more of a report": (lambda at: (at / "evidence/a/more.csv").write_text(""), "`evidence/a/more.csv` is new"),
-    "the index": (lambda at: (at / "evidence/index.md").write_text(""), "`evidence/index.md` differs"),
+    "the index": (lambda at: (at / "evidence/index.html").write_text(""), "`evidence/index.html` differs"),
 }  # fmt: skip
 
 
@@ -127,7 +192,7 @@ def test_what_is_no_record_is_refused(project: Path, capsys: pytest.CaptureFixtu
         "[]",
         "{}",
         text.replace('"a.rcs": "', '"/etc/hosts": "'),
-        text.replace('"form": 1', '"form": 9'),
+        text.replace('"form": 2', '"form": 9'),
     ):
         record.write_text(wrong)
         capsys.readouterr()

@@ -19,6 +19,7 @@ from rcsc.views.evidence import collect as collecting
 from rcsc.views.evidence import whole as kinds
 from rcsc.views.evidence.kind import Evidence, Kind
 from rcsc.views.evidence.whole import Whole
+from rcsc.views.pages.documents import spoken
 
 REPO = Path(__file__).parents[2]
 DOCK, PAPER = REPO / "tests/data/dock/system.toml", REPO / "tables/system.toml"
@@ -88,9 +89,9 @@ def test_what_is_not_looked_at_is_named_in_the_index(
     run(["evidence", "--only", "runtime", "--out", str(tmp_path / "out"), str(DOCK)])
     runtime.version.cache_clear()
     capsys.readouterr()
-    index = (tmp_path / "out" / "index.md").read_text("utf-8")
-    assert "\n## dock\n" in index
-    assert f"- dock.c is not looked at: {kinds.PASSES['runtime']}" in index
+    index = (tmp_path / "out" / "index.html").read_text("utf-8")
+    assert '<h2 id="dock">dock</h2>' in index
+    assert "<li>" + spoken(f"dock.c is not looked at: {kinds.PASSES['runtime']}") + "</li>" in index
 
 
 def test_of_programs_of_one_name_none_is_lost_in_silence(

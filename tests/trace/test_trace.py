@@ -370,20 +370,20 @@ def test_a_requirement_has_a_standing(
     check = ["trace", str(door), "--no-vectors", "--requirements", str(listed)]
     assert run(check) == 0
     said = capsys.readouterr().out
-    assert "7 of 7 requirements have a place: 4 proved, 0 refuted, 3 assumed or not proved here" in said
+    assert "7 of 7 requirements have a place: 4 proved, 0 refuted, 3 assumed, open or not proved here" in said
     assert "parts of the code of `door` carry no requirement" in said
     assert "c/door.h: " in said
     monkeypatch.setattr(collect, "property_proofs", lambda *_: {"opened": f"{REFUTED}, system.toml"})
     assert run(check) == 1
     said = capsys.readouterr().out
-    assert "requirement `SR-12` is refuted: property opened is not proved: `rcsc prove` shows" in " ".join(
+    assert "requirement `SR-12` is refuted: property opened is refuted: `rcsc prove` shows" in " ".join(
         said.split()
     )
-    assert "7 of 7 requirements have a place: 4 proved, 2 refuted, 1 assumed or not proved here" in said
+    assert "7 of 7 requirements have a place: 4 proved, 2 refuted, 1 assumed, open or not proved here" in said
     rows = list(csv.DictReader(io.StringIO(Path("trace/requirements.csv").read_text(encoding="utf-8"))))
     [stands] = [row for row in rows if row["place"] == "property opened" and row["requirement"] == "SR-12"]
     assert stands["verdict"] == f"{REFUTED}, system.toml"
-    assert '<span class="bad">not proved: ' in Path("trace/trace.html").read_text(encoding="utf-8")
+    assert '<span class="bad">refuted: ' in Path("trace/trace.html").read_text(encoding="utf-8")
 
 
 def test_rows_of_scripts_test_requirements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,8 +28,8 @@ def said(found: Across, closed: Closed, claims: Collection[Need]) -> str:
             how = "with late buffers" if any(found.run_late) else "as scheduled"
             return f"refuted in tick {len(found.run)}, {how}, by a run of {levels}"
         if found.stuck:
-            return "not proved: what is assumed across levels was not shown to be kept for ever"
-        return f"not proved; no run of {counted(found.looked, 'tick')} of {levels} breaks it"
+            return "open: what is assumed across levels was not shown to be kept for ever"
+        return f"open: no run of {counted(found.looked, 'tick')} of {levels} breaks it"
     where = f"{timing_of(found)}, of {levels}{f', {found.by}' if found.by else ''}"
     if closed.lacks:
         lacking = report.named([spelled(need, "", claims) for need in closed.lacks])

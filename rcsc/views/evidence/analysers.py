@@ -24,6 +24,7 @@ from rcsc.code.testing.executors.symbols import Symbols, symbols_of
 from rcsc.lang.model import Bool, Program, Real, Scalar, key_bounds
 from rcsc.lang.model import Kind as Role
 from rcsc.views.evidence.kind import Evidence, Kind, Shortfall, Subject, versions_of
+from rcsc.views.pages.dossier_page import AcceptedPoint
 
 TIMEOUT_S = 900.0
 LOOK_S = 300.0
@@ -160,7 +161,9 @@ def looked_at(texts: Iterable[Text], progress: Callable[[str], None]) -> Evidenc
     shortfalls = [*_shortfalls(reports)]
     absent = sorted(set(TOOLS) - here)
     shortfalls += [Shortfall(name, "not installed, so it was not asked") for name in absent]
-    return Evidence(tuple(_figures(reports)), _kept(reports), tuple(shortfalls))
+    return Evidence(
+        tuple(_figures(reports)), _kept(reports), tuple(shortfalls), accepted=tuple(_accepted(reports))
+    )
 
 
 def _reports(text: Text, here: set[str], progress: Callable[[str], None]) -> Iterator[Report]:
@@ -411,6 +414,16 @@ def _kept(reports: list[Report]) -> dict[str, str]:
 
 def _reasons(check: str) -> Iterator[str]:
     yield from (EXPLAINED[name] for name in check.split(",") if name in EXPLAINED)
+
+
+def _accepted(reports: list[Report]) -> Iterator[AcceptedPoint]:
+    """Yield what is meant; of the C that trusts no state, which is not kept, without a line that could be looked up."""
+    for report in reports:
+        for found in report.findings:
+            where = f"{found.file}:{found.line}"
+            place = f"{where} of the defensive C" if found.tool.startswith("defensive") else where
+            if found.reason:
+                yield AcceptedPoint(found.check, place, found.reason)
 
 
 def _commands() -> Iterator[str]:

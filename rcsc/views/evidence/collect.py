@@ -1,6 +1,6 @@
 """All the evidence that was asked for: proved programs to files in a folder, an index and findings."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -9,6 +9,7 @@ from types import MappingProxyType
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.base.diagnostics.source import Span
+from rcsc.base.host.files.read import text
 from rcsc.code.emit.generated import written
 from rcsc.code.testing.apart import Ended, apart
 from rcsc.driver.compile import (
@@ -26,13 +27,14 @@ from rcsc.driver.settings import CodeWanted, Conclusion, Settings
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.resolve import closure
 from rcsc.views.evidence import analysers, coverage, model_check, resources, runtime
-from rcsc.views.evidence.dossier import RECORD, Making, Part, heading, record, sha256
+from rcsc.views.evidence.dossier import INDEX, RECORD, Making, Part, heading, record, sha256, superseded
 from rcsc.views.evidence.kind import Evidence, Kind, Missed, Shortfall, Subject
 from rcsc.views.evidence.misra import compliance
 from rcsc.views.evidence.whole import Whole
 from rcsc.views.evidence.whole import collect as collect_whole
+from rcsc.views.pages.documents import TEXTS, texts_page
+from rcsc.views.pages.dossier_page import Dossier, ShownKind, ShownProgram, dossier_page
 
-INDEX = "index.md"
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "coverage": coverage.KIND,
@@ -82,10 +84,14 @@ def collect(
             of_one[name] = looks.at(name, missed, settings.progress)
             diagnostics += _findings(looks.root, name, of_one[name])
         diagnostics += looks.code.stale
-        made[looks.name] = Part(looks.root, looks.tables, looks.code, of_one)
+        made[looks.name] = Part(looks.name, looks.root, looks.tables, looks.code, of_one)
     settings.progress("")
     making = Making(by, date, settings, {name: KINDS[name].versions() for name in names})
-    diagnostics += written(_files(making, made), folder)
+    files = _files(making, made)
+    old = tuple(superseded(folder, files))
+    diagnostics += written(files, folder)
+    for path in old:
+        path.unlink(missing_ok=True)
     return Conclusion(project.report(tuple(diagnostics)), _closing(folder, made))
 
 
@@ -175,34 +181,45 @@ def _findings(root: str, kind: str, evidence: Evidence) -> Iterator[Diagnostic]:
 
 
 def _files(making: Making, made: Mapping[str, Part]) -> dict[str, str]:
-    """Return every file, the index and the record, by path below the folder."""
+    """Return every file, the index with the texts that it leads to, and the record, by path below the folder."""
     files = {f"{name}/{path}": text for name, part in made.items() for path, text in part.files.items()}
-    index = _index(making, made)
-    return {**files, INDEX: index, RECORD: record(making, made, index)}
+    texts = _texts(made)
+    pages = {INDEX: dossier_page(_dossier(making, made, tuple(texts))), TEXTS: texts_page(texts)}
+    return {**files, **pages, RECORD: record(making, made, pages)}
 
 
-def _index(making: Making, made: Mapping[str, Part]) -> str:
-    """Return a page: how it was made, of which files; of each program and kind the results, the shortfalls, and links to the files."""
-    parts = ["# Evidence", "", *heading(making)]
-    for name, part in made.items():
-        parts += [f"## {name}", "", f"Looked at: {part.code.words}.", "", "| C | SHA-256 |", "| --- | --- |"]
-        parts += [f"| {path} | `{sha256(text)}` |" for path, text in sorted(part.c.items())]
-        parts.append("")
-        for kind, evidence in part.kinds.items():
-            parts += [f"### {kind}: {KINDS[kind].summary}", ""]
-            parts += [f"- {line}" for line in _told(evidence)]
-            parts += [
-                f"- [{path}]({name}/{kind}/{path}) `{sha256(text)}`" for path, text in evidence.files.items()
-            ]
-            parts.append("")
-    return "\n".join(parts)
+def _texts(made: Mapping[str, Part]) -> dict[str, str]:
+    """Return the tables and the C that were looked at, by path."""
+    tables = {path: text(Path(path)) for part in made.values() for path in part.tables}
+    return tables | {_path(part, path): c for part in made.values() for path, c in part.c.items()}
 
 
-def _told(evidence: Evidence) -> Iterator[str]:
-    yield from evidence.figures
-    if evidence.missing:
-        yield f"shows nothing: {evidence.missing}"
-    yield from (f"lacks: {short.where}: {short.what}" for short in evidence.shortfalls)
+def _path(part: Part, path: str) -> str:
+    """Return where a file of C lies; of C that lies nowhere, where its dossier keeps it."""
+    return str(part.code.folder / path) if part.code.folder is not None else f"{part.name}/code/{path}"
+
+
+def _dossier(making: Making, made: Mapping[str, Part], texts: Sequence[str]) -> Dossier:
+    """Return what the index says."""
+    tools = [(kind, *tool) for kind, versions in making.versions.items() for tool in versions.items()]
+    programs = [
+        ShownProgram(
+            name,
+            part.source,
+            part.code.words,
+            [(_path(part, path), sha256(c)) for path, c in sorted(part.c.items())],
+            [_shown(name, kind, evidence) for kind, evidence in part.kinds.items()],
+        )
+        for name, part in made.items()
+    ]
+    return Dossier(heading(making), tools, programs, texts)
+
+
+def _shown(program: str, kind: str, evidence: Evidence) -> ShownKind:
+    lacks = [(short.where, short.what) for short in evidence.shortfalls]
+    files = [(f"{program}/{kind}/{path}", sha256(each)) for path, each in evidence.files.items()]
+    summary = KINDS[kind].summary
+    return ShownKind(kind, summary, evidence.figures, lacks, evidence.missing, evidence.accepted, files)
 
 
 def _closing(folder: Path, made: Mapping[str, Part]) -> str:

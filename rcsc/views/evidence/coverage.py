@@ -14,7 +14,7 @@ from rcsc.code.testing.coverage.marks import Outcomes, marked, ways_of
 from rcsc.code.testing.coverage.vector_set import defended, figure, further_figures, vector_set
 from rcsc.code.testing.target_coverage import BOARD, counted_on_target
 from rcsc.driver.trials import proofs
-from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Missed, Shortfall, Subject, versions_of
+from rcsc.views.evidence.kind import ABSENT, Evidence, Kind, Missed, Shortfall, Subject, excused, versions_of
 from rcsc.views.evidence.llvm import Measured, Tools, measured, tools
 from rcsc.views.evidence.out_of_reach import Reasons, uncovered
 
@@ -46,6 +46,7 @@ def collect(subject: Subject) -> Evidence:
             *(Shortfall(f"{GUARDED}, {each.where}", each.what) for each in whole.shortfalls),
         ),
         missed=plain.missed,
+        accepted=plain.accepted,
     )
 
 
@@ -87,7 +88,13 @@ def _of(llvm: Tools, subject: Subject, document: VectorSet, gained: int) -> Evid
         "missed.json": json.dumps([asdict(each) for each in missed], indent=1) + "\n",
     }
     figures, shortfalls = _figures(llvm, document, seen, missed, gained), _shortfalls(document, seen, missed)
-    return Evidence(figures, files, tuple(shortfalls), missed=tuple(missed))
+    return Evidence(
+        figures,
+        files,
+        tuple(shortfalls),
+        missed=tuple(missed),
+        accepted=tuple(excused(document.symbols.source, missed)),
+    )
 
 
 def _kind_of(missed: Missed) -> str:

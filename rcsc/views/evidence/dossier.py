@@ -8,7 +8,7 @@ import getpass
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,8 +26,8 @@ from rcsc.driver.compile import CodeFound
 from rcsc.driver.settings import Conclusion, Settings
 from rcsc.views.evidence.kind import Evidence
 
-RECORD = "index.json"
-FORM = 1
+INDEX, RECORD = "index.html", "index.json"
+FORM = 2
 """Version of the record's form; it rises when a member changes its meaning or goes away."""
 EPOCH = "SOURCE_DATE_EPOCH"
 MOST_PROGRAMS = 10_000
@@ -38,11 +38,13 @@ class Part:
     """A program or system of a dossier.
 
     Attributes:
+        name: Of its folder.
         tables: Files that it is declared in.
         code: Its C, as it was looked at.
         kinds: Its evidence.
     """
 
+    name: str
     source: str
     tables: tuple[str, ...]
     code: CodeFound
@@ -132,13 +134,13 @@ def sha256(data: bytes | str) -> str:
     return hashlib.sha256(data if isinstance(data, bytes) else data.encode()).hexdigest()
 
 
-def record(making: Making, parts: Mapping[str, Part], index: str) -> str:
+def record(making: Making, parts: Mapping[str, Part], pages: Mapping[str, str]) -> str:
     """Return the record of a dossier as JSON.
 
     Args:
         making: How it was made.
         parts: Programs and systems, by the names of their folders.
-        index: The text of its index.
+        pages: Its index, and the texts that this leads to, by name.
     """
     seen: dict[str, dict[str, str]] = {}
     programs = []
@@ -158,22 +160,47 @@ def record(making: Making, parts: Mapping[str, Part], index: str) -> str:
             }
         )
     beside = sorted(path for where in seen for path in _c_in(Path(where)) if path not in seen[where])
-    document = {**making.told(), "index": sha256(index), "programs": programs, "not_looked_at": beside}
+    digests = {name: sha256(text) for name, text in pages.items()}
+    document = {**making.told(), "pages": digests, "programs": programs, "not_looked_at": beside}
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
 
 
-def heading(making: Making) -> Iterator[str]:
-    """Yield the lines of the index that say how the dossier was made."""
+def heading(making: Making) -> tuple[str, ...]:
+    """Return the sentences of the index that say how the dossier was made."""
     told = making.told()
-    yield f"Made {making.date} by {making.by}, with rcsc {__version__}, of {', '.join(making.settings.paths)}."
-    yield f"Options: {', '.join(f'{name} {value}' for name, value in told['options'].items())}."
-    boards = told["target"]["boards"]
-    yield f"Target: {', '.join([told['target']['host'], *boards])}."
-    yield f"`{RECORD}` has the SHA-256 of every file; `rcsc evidence --check` holds them against a checkout."
-    yield from ("", "| kind | tool | version |", "| --- | --- | --- |")
-    for kind, versions in making.versions.items():
-        yield from (f"| {kind} | {tool} | {version} |" for tool, version in versions.items())
-    yield ""
+    options = ", ".join(f"{name} {value}" for name, value in told["options"].items())
+    target = ", ".join([told["target"]["host"], *told["target"]["boards"]])
+    of = ", ".join(making.settings.paths)
+    return (
+        f"Made {making.date} by {making.by}, with rcsc {__version__}, of {of}. Options: {options}. Target: {target}.",
+        "Every table is proved: exactly one line matches; `rcsc check` says what that trusts.",
+        "What levels do over time and together is proved by `rcsc prove`; `rcsc trace` leads from requirements to code and tests.",
+        f"`{RECORD}` has the SHA-256 of every file; `rcsc evidence --check` holds them against a checkout.",
+    )
+
+
+def superseded(folder: Path, files: Collection[str]) -> Iterator[Path]:
+    """Yield the files that an earlier dossier in this folder had and this one has not, as they were written.
+
+    Args:
+        folder: Of the dossier.
+        files: Paths below it that this one has.
+    """
+    try:
+        document = CheckedFields(json_of(text(folder / RECORD)), RECORD)
+        kept = dict(_digests(document, "pages"))
+        for program in document.each("programs", MOST_PROGRAMS):
+            kept |= _digests(program, "reports")
+    except (OSError, Malformed):
+        return
+    for path, digest in kept.items():
+        here = folder / path
+        if (
+            path not in files
+            and folder.resolve() in here.resolve().parents
+            and _differs(here, digest) is None
+        ):
+            yield here
 
 
 # --- a dossier that was kept ------------------------------------------------------------------
@@ -188,7 +215,7 @@ def held(folder: Path) -> Conclusion:
     """
     document = CheckedFields(json_of(text(folder / RECORD)), RECORD)
     document.whole("form", FORM, FORM)
-    digests = {str(folder / "index.md"): document.text("index")}
+    digests = {str(folder / path): sha for path, sha in _digests(document, "pages").items()}
     looked: dict[str, str] = {}
     for program in document.each("programs", MOST_PROGRAMS):
         looked |= {**_digests(program, "tables"), **_digests(program, "code")}

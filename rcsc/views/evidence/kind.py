@@ -1,6 +1,6 @@
 """What a kind of evidence takes and gives."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from rcsc.code.emit.plan import Plan
 from rcsc.driver.settings import silent
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.proof.solvers.options import Options
+from rcsc.views.pages.dossier_page import AcceptedPoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,7 @@ class Evidence:
         shortfalls: The parts that are not shown; none for evidence that is whole.
         missing: The tool that is not installed, and what would install it; then nothing is shown.
         missed: What was not covered, where that was measured; None where it was not.
+        accepted: The findings that are meant, each with its reason.
     """
 
     figures: tuple[str, ...]
@@ -86,6 +88,7 @@ class Evidence:
     shortfalls: tuple[Shortfall, ...] = ()
     missing: str = ""
     missed: tuple[Missed, ...] | None = None
+    accepted: tuple[AcceptedPoint, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +104,13 @@ class Kind:
     summary: str
     collect: Callable[[Subject], Evidence]
     versions: Callable[[], Mapping[str, str]] = dict
+
+
+def excused(source: str, missed: Iterable[Missed]) -> Iterator[AcceptedPoint]:
+    """Yield what was not covered of a file of C, and cannot be."""
+    for each in missed:
+        if each.reason:
+            yield AcceptedPoint(f"not covered: {each.what}", f"{source}:{each.line}", each.reason)
 
 
 ABSENT = "not installed"

@@ -21,7 +21,7 @@ from rcsc.lang.restart import After, SameAs
 from rcsc.run.link import Linked
 from rcsc.run.link.wiring import End, LinkedLevel, Question
 from rcsc.views.evidence import analysers
-from rcsc.views.evidence.kind import Evidence, Missed, Shortfall
+from rcsc.views.evidence.kind import Evidence, Missed, Shortfall, excused
 from rcsc.views.evidence.llvm import Measured, Point, measured, tools
 from rcsc.views.evidence.misra import compliance
 from rcsc.views.evidence.out_of_reach import uncovered
@@ -80,7 +80,8 @@ def _coverage(whole: Whole) -> Evidence:
     rows = [("line", "function", "what", "reason")]
     rows += [(str(each.line), each.function, each.what, each.reason) for each in missed]
     files = {"drawn.c": main, "coverage.txt": seen.text, "missed.csv": csv_text(rows)}
-    return Evidence(figures, files, tuple(short), missed=tuple(missed))
+    accepted = tuple(excused(whole.source, missed))
+    return Evidence(figures, files, tuple(short), missed=tuple(missed), accepted=accepted)
 
 
 def _missed(whole: Whole, seen: Measured) -> Iterator[Missed]:

@@ -25,5 +25,6 @@ A *film* of a run is a file, too: what stands outside, in space, photographed wh
 
 Modules, in the order the data flows: `frame` reads templates, of which `page.html.jinja` is what all pages have in common; `data` says
 who knows the world outside and draws it; `witness` watches a run, `log_page` reads one; `report`, `finding_page` and
-`requirement_page` are pages; `video` is a film.
+`requirement_page` are pages; `documents` has the parts of those that an assessor is handed, of which `dossier_page` is one; `video` is a
+film.
 """

@@ -38,10 +38,11 @@ from rcsc.driver.trials import whole_vectors
 from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import project_root, systems_above
 from rcsc.run.description import description
+from rcsc.views.pages.documents import TEXTS, texts_page
 from rcsc.views.trace.across import declared_across, of_lines
 from rcsc.views.trace.kept import against, kept, names_of
 from rcsc.views.trace.matrix import OPEN, REFUTED, Matrix, ProgramFacts, TableProof, matrix, of_system
-from rcsc.views.trace.page import TEXTS, page, texts_page
+from rcsc.views.trace.page import page
 from rcsc.views.trace.requirements import covered, findings, listed, of_scripts, refuted, standings
 from rcsc.views.trace.tables_of import code_csv, lines_csv, requirements_csv, to_json
 
@@ -103,7 +104,7 @@ class Traced:
             "code.csv": code_csv(self.matrices),
             "requirements.csv": requirements_csv(self.matrices, self.listed),
             "trace.html": page(self.matrices, self.listed),
-            TEXTS: texts_page(self.matrices),
+            TEXTS: texts_page({path: text for one in self.matrices for path, text in one.texts.items()}),
         }
 
 

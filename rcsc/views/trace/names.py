@@ -29,7 +29,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.restart import Adopted, After, Fixed, SameAs, Stands
 from rcsc.run.description import Description
-from rcsc.views.trace.page import framed, listing, row, tabled
+from rcsc.views.pages.documents import framed, listing, row, tabled
 
 FORM = 1
 """Version of the JSON form; it rises when a member changes its meaning or goes away."""

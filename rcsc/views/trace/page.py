@@ -1,4 +1,4 @@
-"""A matrix as a page, and the texts that its places lead to as another: without a script, dark where the reader's screen is, to be printed.
+"""A matrix as a page, whose places lead to the page of texts.
 
 In: matrices. Out: HTML.
 """
@@ -6,42 +6,14 @@ In: matrices. Out: HTML.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby
-from urllib.parse import quote
 
 from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
-from rcsc.views.pages.frame import palette
+from rcsc.views.pages.documents import framed, led, listing, row, spoken, tabled
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
 from rcsc.views.trace.requirements import Standing, standings
 from rcsc.views.trace.tables_of import spots
 
-_STYLE = """* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1.2rem 1.5rem; max-width: 92rem; background: var(--paper); color: var(--ink);
-  font: 14px/1.4 system-ui, sans-serif; }
-h1 { font-size: 1.5rem; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2rem 0 .4rem; border-bottom: 2px solid var(--edge); }
-h3 { font-size: 1rem; margin: 1.2rem 0 .2rem; }
-p { margin: .2rem 0 .5rem; color: var(--soft); max-width: 80rem; }
-table { border-collapse: collapse; width: 100%; margin-bottom: .6rem; }
-th, td { padding: .2rem .5rem; text-align: left; vertical-align: top; border-bottom: 1px solid var(--edge); overflow-wrap: anywhere; }
-th { font-size: .8rem; color: var(--soft); background: var(--panel); }
-td { font-size: .82rem; }
-code { font: .95em ui-monospace, monospace; }
-.soft { color: var(--soft); } .bad { color: var(--bad); font-weight: 600; }
-.for { color: var(--accent); font-weight: 600; } a { color: inherit; }
-.at { white-space: nowrap; }
-.text { counter-reset: line; margin: 0; padding: .4rem 0; font: 12px/1.45 ui-monospace, monospace; overflow-x: auto; }
-.text span { display: block; }
-.text span::before { counter-increment: line; content: counter(line); display: inline-block; width: 4em; color: var(--soft); }
-.text :target { background: var(--lit); color: var(--lit-ink); }
-nav a { margin-right: 1rem; }
-tr:target { outline: 2px solid var(--accent); }
-@media print {
-  body { padding: 0; max-width: none; font-size: 9pt; } h2 { break-before: page; }
-  tr { break-inside: avoid; } thead { display: table-header-group; }
-}
-@page { size: A4 landscape; margin: 12mm; }
-"""
 _ABOUT = (
     "From requirements and lines of tables to generated code, tests and proofs, and back. Places of code are lines of a file, first "
     "and last. Vectors have the numbers of the file that <code>rcsc test --vectors</code> writes: those that show a condition of the line "
@@ -50,7 +22,6 @@ _ABOUT = (
     "requirements are scripts of orders (<code>rcsc run</code>) and watched episodes (<code>rcsc campaign</code>), which are kept apart."
 )
 NONE, NOT_MADE = '<span class="soft">none</span>', '<span class="soft">not made</span>'
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
@@ -66,61 +37,11 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
     return framed("Traceability", body)
 
 
-TEXTS = "texts.html"
-"""The page of texts, beside that of the matrix."""
-
-
-def texts_page(matrices: Sequence[Matrix]) -> str:
-    """Return the texts of tables and generated files, each line a place that the matrix leads to."""
-    texts = {path: text for one in matrices for path, text in one.texts.items()}
-    body = ["<h1>Texts</h1>", "<p>Tables, and the code that is made of them, as they were traced.</p>"]
-    links = (f'<a href="#{escape(quote(path))}">{escape(path)}</a>' for path in texts)
-    body.append(f"<nav>{''.join(links)}</nav>")
-    for path, text in texts.items():
-        lines = "".join(
-            f'<span id="{escape(path)}:{at}">{escape(line) or " "}</span>'
-            for at, line in enumerate(text.splitlines(), 1)
-        )
-        body += [f'<h2 id="{escape(path)}">{escape(path)}</h2>', f'<pre class="text">{lines}</pre>']
-    return framed("Texts", body)
-
-
 def _led(matrix: Matrix, path: str, line: int | str, shown: str) -> str:
     """Return what is shown of a place, as a link to its line where its text is there."""
     if path not in matrix.texts:
         return shown
-    return f'<a href="{TEXTS}#{escape(quote(path))}:{line}">{shown}</a>'
-
-
-def framed(title: str, body: Iterable[str]) -> str:
-    """Return a page of these parts, which needs no script and no other file."""
-    return (
-        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<meta name="color-scheme" content="light dark">\n'
-        f'<link rel="icon" href="data:,">\n<title>{escape(title)}</title>\n<style>\n{palette()}{_STYLE}</style>\n</head>\n<body>\n'
-        + "\n".join(body)
-        + "\n</body>\n</html>\n"
-    )
-
-
-def tabled(headings: Mapping[str, int], rows: Iterable[str]) -> str:
-    """Return a table; the width of each column in per cent."""
-    columns = "".join(f'<col style="width: {width}%">' for width in headings.values())
-    heads = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
-    return f"<table><colgroup>{columns}</colgroup><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
-
-
-def row(*cells: str, name: str = "") -> str:
-    """Return a row of cells that are HTML; a name that others can point at."""
-    mark = f' id="{escape(name)}"' if name else ""
-    return f"<tr{mark}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
-
-
-def listing(words: Iterable[str], style: str = "") -> str:
-    """Return words one below the other, as a cell."""
-    cell = "<br>".join(map(escape, words))
-    return f'<span class="{style}">{cell}</span>' if style and cell else cell
+    return led(path, line, shown)
 
 
 def _requirements(known: Mapping[str, Sequence[Standing]], listed: Sequence[str]) -> Iterator[str]:
@@ -139,7 +60,9 @@ def _requirements(known: Mapping[str, Sequence[Standing]], listed: Sequence[str]
             rows.append(row(head, '<span class="bad">nothing is for it</span>', NONE, NONE, NONE))
         for at, one in enumerate(known.get(name, ())):
             verdict = (
-                f'<span class="bad">{_spoken(one.verdict)}</span>' if one.refuted else _spoken(one.verdict)
+                f'<span class="bad">{spoken(one.verdict)}</span>'
+                if one.refuted or one.open
+                else spoken(one.verdict)
             )
             tests, shown = escape(one.tests) or NOT_MADE, escape(one.coverage) or NOT_MADE
             rows.append(
@@ -217,12 +140,6 @@ def _place(matrix: Matrix, place: str, *, short: bool = False) -> str:
     return _led(matrix, file, number or 1, "<wbr>".join(_unbroken(piece) for piece in pieces if piece))
 
 
-def _spoken(text: str) -> str:
-    """Return a sentence whose names stand in backticks, with these set apart."""
-    parts = escape(text).split("`")
-    return "".join(f"<code>{part}</code>" if at % 2 else part for at, part in enumerate(parts))
-
-
 def _unbroken(words: str) -> str:
     """Return a name or numbers that stay on one line: a column grows with its longest."""
     return f'<span class="at">{escape(words)}</span>'
@@ -255,9 +172,9 @@ def _declared(matrix: Matrix, one: Declared) -> str:
     return row(
         f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(matrix, one.place)}</span>',
         listing(one.requirements, "for") or NONE,
-        _spoken(one.states) or NONE,
+        spoken(one.states) or NONE,
         escape(", ".join(one.used)) or NONE,
-        _spoken(one.proof) or NONE,
+        spoken(one.proof) or NONE,
     )
 
 

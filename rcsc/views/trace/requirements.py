@@ -55,6 +55,11 @@ class Standing:
         """Whether it was found not to hold."""
         return self.verdict.startswith("refuted")
 
+    @property
+    def open(self) -> bool:
+        """Whether it was asked, and is neither proved nor refuted."""
+        return self.verdict.startswith("open")
+
 
 def standings(matrices: Iterable[Matrix]) -> dict[str, list[Standing]]:
     """Give the places that name each requirement, in the order in which they are met, with its standing there.
@@ -65,7 +70,7 @@ def standings(matrices: Iterable[Matrix]) -> dict[str, list[Standing]]:
     for matrix in matrices:
         for name, here in _named(matrix):
             known = found.setdefault(name, {})
-            if here.place not in known or here.refuted:
+            if here.place not in known or here.refuted or (here.open and not known[here.place].refuted):
                 known[here.place] = here
     return {name: list(where.values()) for name, where in sorted(found.items())}
 
@@ -137,14 +142,14 @@ def _standing(place: str, verdict: str, lines: Sequence[TracedLine]) -> Standing
 
 
 def refuted(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:
-    """Report each requirement that is refuted at a place that names it."""
+    """Report each requirement that is refuted, or was left open, at a place that names it."""
     sources = {f"{one.sort} {one.name}": one.place for matrix in matrices for one in matrix.declared}
     for name, where in standings(matrices).items():
         for one in where:
-            if one.refuted:
+            if one.refuted or one.open:
                 file = sources.get(one.place, "").rpartition(":")[0]
                 yield Diagnostic(
-                    Code.REQUIREMENT_OPEN, f"requirement `{name}` is refuted: {one.place} is {one.verdict}",
+                    Code.REQUIREMENT_OPEN, f"requirement `{name}` is {'refuted' if one.refuted else 'open'}: {one.place} is {one.verdict}",
                     Label(Span(file, 0, 0)),
                 )  # fmt: skip
 

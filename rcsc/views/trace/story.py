@@ -73,7 +73,7 @@ def level_story(
         "proved": "proved in every environment that the contract of the level allows",
         "conditional": "proved, given what it rests on",
         "refuted": "a run of the level, in an environment that its contract allows, breaks it",
-        "open": "not proved; no run was found that breaks it",
+        "open": "open: no run was found that breaks it",
     }[state]
     return replace(
         _story(its, stated, level, closed),

@@ -52,8 +52,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     differs from what the tables give, or is missing, is a finding. What a kind cannot show is a finding, with its place and its
     reason, and so is a tool that is not installed.
 
-    index.md says when, by whom and with which tools it was made; index.json has that and the SHA-256 of every table, C file, header,
-    vector and report, which --check compares. The date is that of SOURCE_DATE_EPOCH, where it is set.
+    index.html, for an assessor, says when, by whom and with which tools it was made, what it shows and lacks, and what is accepted with
+    its reason; its places lead to texts.html. Files that an earlier dossier in the folder had, and this one has not, are removed.
+    index.json has the SHA-256 of every table, C file, header, vector and report, which --check compares. The date is that of
+    SOURCE_DATE_EPOCH, where it is set.
     """
     if checked is not None:
         if paths:

@@ -34,6 +34,7 @@ from rcsc.views.evidence.misra.cppcheck import (
     installed,
 )
 from rcsc.views.evidence.misra.guidelines import RULES, Category, Guideline, guidelines
+from rcsc.views.pages.dossier_page import AcceptedPoint
 
 ELSEWHERE: Mapping[str, str] = {
     "Dir 2.1": "`rcsc evidence --only analysers` compiles it with every warning", "1.1": "`rcsc evidence --only analysers`",
@@ -348,7 +349,12 @@ def evidence_of(files: Mapping[str, str], missed: Sequence[Missed] | None = None
         "places.csv": _places(made),
         "suppressions.txt": _suppressions(made),
     }
-    return Evidence((figure,), tables, tuple(_shortfalls(made)))
+    accepted = tuple(
+        AcceptedPoint(place.guideline, place.where, place.deviation.reason)
+        for place in made.places
+        if place.deviation is not None and place not in made.unexplained
+    )
+    return Evidence((figure,), tables, tuple(_shortfalls(made)), accepted=accepted)
 
 
 KIND = Kind(
