@@ -1,5 +1,6 @@
 """Who waits for a proof sees what is being done, which of how many it is, and how long it took last time."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,20 @@ def test_elsewhere_than_on_a_terminal_what_is_done_is_told_where_that_is_wanted(
     assert [line.split(":")[0] for line in told][:2] == ["level supervisor", "level axis"]
     assert [line for line in told if line.startswith("requirement ")]
     assert all("last time" not in line for line in told)
+
+
+@pytest.mark.usefixtures("terminal")
+def test_a_campaign_names_what_it_does_before_and_after_its_episodes(
+    cart: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A requirement is added that is false, so that there is a finding to be made small."""
+    with (cart / "requirements.rcs").open("a", encoding="utf-8") as file:
+        file.write("\nrequirement stays monitored : never axis.speed_mm_s /= 0 [mm/s]\n")
+    campaign = ["campaign", str(cart), "--episodes", "2", "--workers", "1", "--save", str(cart / "kept")]
+    assert run(campaign) == 1
+    first = capsys.readouterr().err
+    assert "proving and compiling the tables\r" in first
+    assert "proving what is watched of the levels\r" in first
+    assert "making finding 1 of 1 as small as it gets" in first
+    run([*campaign, "--seed", "5"])  # whatever it finds
+    assert re.search(r"proving and compiling the tables \(\d+ s last time\)", capsys.readouterr().err)

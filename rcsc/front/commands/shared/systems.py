@@ -1,6 +1,7 @@
 """What the commands about a system share: which one is meant, and its executors made."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import click
@@ -176,20 +177,24 @@ def _is_script(path: Path) -> bool:
         return False
 
 
-def made(path: Path, *, compiles: bool, quiet: bool) -> bool:
+def made(
+    path: Path, *, compiles: bool, quiet: bool, doing: AbstractContextManager[None] | None = None
+) -> bool:
     """Update a system's executors from its tables, or report that nobody looked; return whether they may run.
 
     Args:
         path: Of the description.
         compiles: Whether what changed is proved and compiled, and findings are shown.
         quiet: Whether it is not told how many tables that were.
+        doing: Tells that it is being done; nobody is told without.
     """
     from rcsc.driver.compile import compile_system  # only here: what is known already is printed without
 
     if not compiles:
         as_they_lie(description(path).generated)
         return True
-    conclusion = compile_system(path)
+    with doing or nullcontext():
+        conclusion = compile_system(path)
     if conclusion.report.failed:
         show(conclusion.report, "compile", Output())
     elif not quiet:

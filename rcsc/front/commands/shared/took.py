@@ -1,6 +1,8 @@
 """How long each part of a proof took last time, for who waits for the next; kept with the proofs, for the machine that they ran on."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -52,6 +54,19 @@ class Clock:
         if self._cache is not None and self._now:
             whole = self._known | self._now
             self._cache.store(Took(tuple(whole), tuple(whole.values())), *self._parts)
+
+
+@contextmanager
+def doing(clock: Clock, name: str) -> Iterator[None]:
+    """Name something on a terminal's standard error while it is done, with what it took last time."""
+    line, begun = Progress(), time.perf_counter()
+    line(clock.said(name))
+    try:
+        yield
+    finally:
+        line("")
+        clock.took(name, time.perf_counter() - begun)
+        clock.keep()
 
 
 class Answering:

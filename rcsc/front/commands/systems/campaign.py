@@ -4,11 +4,11 @@ import json
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import click
 
@@ -20,6 +20,7 @@ from rcsc.front.commands.shared.paths import There
 from rcsc.front.commands.shared.show import Progress, put, writing
 from rcsc.front.commands.shared.stopped import attach, say_error
 from rcsc.front.commands.shared.systems import COMPILES, SYSTEM, made, meant, system_path
+from rcsc.front.commands.shared.took import Clock, doing
 from rcsc.run.campaign.choose import kind_of, plant_name, plant_of
 from rcsc.run.campaign.counterexamples import (
     MOST,
@@ -42,6 +43,7 @@ from rcsc.run.episodes.proved.claims import Claims
 from rcsc.run.episodes.stand import stand
 from rcsc.run.system import Kind
 
+T = TypeVar("T")
 _TO = click.Path(dir_okay=False, path_type=Path)
 _TERMINAL_S, _PLAIN_S = 1.0, 10.0
 """How often a line of progress is said: on a terminal over the last one, elsewhere below it."""
@@ -110,9 +112,11 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError(f"`{target}` is a system, and `--system` names another")
     path, named = meant(None, system_path(target or system), script)
     rig = _rig(path, plant, executor, named, limit_s)
-    if not made(path, compiles=compiles, quiet=True):
+    clock = Clock(open_cache(path.resolve().parent), path)
+    if not made(path, compiles=compiles, quiet=True, doing=doing(clock, "proving and compiling the tables")):
         return 1
-    rig = replace(rig, claims=_claims(rig, wanted=claims, compiles=compiles))
+    with doing(clock, "proving what is watched of the levels"):
+        rig = replace(rig, claims=_claims(rig, wanted=claims, compiles=compiles))
     shown = ["--system", str(target or system)] if target or system else []
     plays = [*([str(target)] if target else shown), *(["--plant", plant] if plant else []), "--again"]
     asked = CampaignOptions(
@@ -285,7 +289,7 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
             place = folder / choice.name(seed)
             click.echo(f"saved before: {place}: {asked.again} {shlex.quote(str(place))}")
     shown: dict[tuple[str, EpisodeValue | tuple[str, ...]], Path] = {}
-    for choice, counterexample in counterexamples(rig, seed, wanted, pool):
+    for choice, counterexample in _named(counterexamples(rig, seed, wanted, pool), len(wanted)):
         with writing(folder / choice.name(seed)):
             place = save(folder, rig, seed, choice, counterexample)
         what = rig.kind.told(counterexample.episode) or counterexample.episode
@@ -298,6 +302,18 @@ def _save(asked: CampaignOptions, seed: int, records: list[EpisodeRecord], pool:
         _show(asked, choice.index, counterexample, place)
     if len(chosen) > MOST:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
+
+
+def _named(found: Iterator[T], many: int) -> Iterator[T]:
+    """Yield findings, and name on a terminal which of so many is being made small."""
+    line = Progress()
+    for at in range(1, many + 1):
+        line(f"making finding {at} of {many} as small as it gets")
+        one = next(found, None)
+        line("")
+        if one is None:
+            return
+        yield one
 
 
 def _show(asked: CampaignOptions, index: int, counterexample: Shrunk[Any], place: Path) -> None:
