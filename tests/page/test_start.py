@@ -139,3 +139,15 @@ def test_every_page_goes_with_what_is_opened(tmp_path: Path) -> None:
         arrived(seat)
         other.until("#title", "second")
         assert not other.said
+
+
+def test_what_a_browser_keeps_of_a_project_it_finds_again(tmp_path: Path) -> None:
+    """By its port, which stays; a second studio of the project takes another."""
+    assert rcsc(["new", str(tmp_path / "door")]) == 0
+    with studio(tmp_path, "door") as (_, address):
+        port = address.split("/")[2]
+        with studio(tmp_path, "door") as (_, second):
+            assert second.split("/")[2] != port
+    with studio(tmp_path, "door") as (_, again):
+        assert again.split("/")[2] == port
+        assert again != address, "the token is new"

@@ -6,6 +6,7 @@ the folder `page` and nothing else, and talks over one socket: questions and ans
 
 import asyncio
 import contextlib
+import hashlib
 import os
 import secrets
 import signal
@@ -15,6 +16,7 @@ import traceback
 from collections.abc import Awaitable, Callable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from aiohttp import WSMsgType, web
 
@@ -27,6 +29,7 @@ from rcsc.desk.studio.hub import DEEPEST_MESSAGE, Client, Concern, Hub
 ADDRESS = "127.0.0.1"
 MOST_BYTES = 4 * MIB
 """Of a message from a page: the text of a file and what stands around it."""
+FIRST_PORT, LAST_PORT = 61_000, 65_535
 MOST_PAGES = 16
 """Pages at once."""
 HEARTBEAT_S = 20.0
@@ -64,6 +67,15 @@ def page_files() -> dict[str, Traversable]:
     return found | {"": found["index.html"]}
 
 
+def usual_port(project: Path) -> int:
+    """Return the port at which a project's studio listens where it can: what a browser keeps of a page, it keeps by its port.
+
+    It is one of those that nobody registers (RFC 6335, section 6), and past those that Linux gives to connections.
+    """
+    digest = hashlib.sha256(os.fsencode(project.resolve())).digest()
+    return FIRST_PORT + int.from_bytes(digest[:4], "big") % (LAST_PORT - FIRST_PORT + 1)
+
+
 class Server:
     """Serves one studio.
 
@@ -72,11 +84,11 @@ class Server:
         address: Of the page, once the server listens.
     """
 
-    def __init__(self, port: int = 0, token: str = "") -> None:
-        """Args: port: To listen on; 0 for a free one; token: Of the address; empty for a new one."""
+    def __init__(self, port: int = 0, token: str = "", usual: int = 0) -> None:
+        """Args: port: To listen on; 0 for the usual one, or a free one; token: Of the address; usual: See `usual_port`."""
         self.hub = Hub(self._soon)
         self.address = ""
-        self._wanted, self._port = port, 0
+        self._wanted, self._usual, self._port = port, usual, 0
         self._token = token or secrets.token_urlsafe(24)
         self._files = page_files()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -150,6 +162,9 @@ class Server:
     async def _listens(self) -> asyncio.Server:
         """Listen at the port; raise `NoPort` where that fails."""
         assert self._entrance is not None
+        if not self._wanted and self._usual:
+            with contextlib.suppress(OSError):  # another studio of the project, or somebody else, has it
+                return await self._entrance.listen(ADDRESS, self._usual)
         try:
             return await self._entrance.listen(ADDRESS, self._wanted)
         except OSError as error:

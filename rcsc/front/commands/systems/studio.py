@@ -58,7 +58,11 @@ Examples:
 @click.option("--log", "logs", multiple=True, type=There(dir_okay=False, path_type=Path), metavar="FILE",
               help="A log to look at, wherever it lies (repeatable); the first is shown at once.")  # fmt: skip
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Where to listen; else a free one."
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    metavar="N",
+    help="Where to listen; else the project's usual port, or a free one.",
 )
 @click.option("--open", "opens", is_flag=True, help="Open the page in this machine's browser.")
 @click.option("--trust", "trusts", is_flag=True,
@@ -124,10 +128,11 @@ def serve(
         runs_at: Run at once, so many times as fast as the clock; None where the page says when.
     """
     from rcsc.desk.studio.runs.live import WATCHED, Pace  # of an extra
-    from rcsc.desk.studio.server import Server
+    from rcsc.desk.studio.server import Server, usual_port
     from rcsc.desk.studio.start import Start
 
-    server, partings = Server(port), list[str]()
+    project = Path.cwd() if chosen is None else _agreement(chosen).folder
+    server, partings = Server(port, usual=usual_port(project)), list[str]()
     pace = WATCHED if runs_at is None else Pace(runs_at, runs=True)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as held:
         starts = _starts(held)
