@@ -175,8 +175,8 @@ def story(editor: Editor, address: str, picture: Callable[[str], None]) -> None:
         "[...document.querySelectorAll('.explorer-folders-view .monaco-list-row')].find(e => e.textContent.includes('door.rcs'))"
     )
     editor.wait(f"{MARKS} > 0")
-    editor.wait(f"{STATUS}.includes('failed')")
-    editor.wait(f"{LENSES}.includes('failed: lines')")
+    editor.wait(f"{STATUS}.includes('refuted')")
+    editor.wait(f"{LENSES}.includes('refuted: lines')")
     assert editor.value(f"{LENSES}.includes('run the witness')")
     picture("underlined")
     assert "`rise` and `top`" in editor.value(LENSES)
@@ -190,7 +190,7 @@ def story(editor: Editor, address: str, picture: Callable[[str], None]) -> None:
     editor.wait(f"{MARKS} === 0")
     editor.wait(f"{STATUS}.includes('proved')")
     editor.wait(f"{LENSES}.includes('proved: exactly one line matches every input')")
-    assert "failed" not in editor.value(LENSES) + editor.value(STATUS), "what is seen agrees"
+    assert "refuted" not in editor.value(LENSES) + editor.value(STATUS), "what is seen agrees"
     assert editor.value("document.querySelectorAll('.cgmr').length") >= 1, "a mark in the gutter"
     picture("mended")
     editor.wait(f"/\\| top .*\\| open +\\| +2000 +\\|\\|/.test({TEXT})")
@@ -222,8 +222,8 @@ def _cells(editor: Editor) -> None:
     editor.command("Add a Line to This Table")
     editor.wait(f"{CURSOR}.includes('Ln {below}')")
     editor.write("late")
-    editor.wait(f"{STATUS}.match(/failed|stale/)")
-    editor.wait(f"{LENSES}.match(/failed: |stale: /)")
+    editor.wait(f"{STATUS}.match(/refuted|undecided|has errors|stale/)")
+    editor.wait(f"{LENSES}.match(/refuted: |undecided: |has errors: |stale: /)")
     assert "proved" not in editor.value(f"{STATUS} + {LENSES}")
     editor.command("View: Focus Active Editor Group")
     while "late" in editor.value(TEXT):

@@ -102,6 +102,7 @@ READERS_OF_FILES: Mapping[str, str] = {
     "rcsc/lang/syntax/parse.py": "comes with the compiler",
     "rcsc/desk/studio/server.py": "comes with the compiler",
     "rcsc/desk/studio/share/document.py": "comes with the compiler",
+    "rcsc/desk/studio/start.py": "comes with the compiler",
     "rcsc/front/commands/shared/scaffold.py": "comes with the compiler",
     "sim/rcsc_cell/cell/reach.py": "comes with the cell",
 }
@@ -1011,7 +1012,7 @@ def test_no_text_ends_a_cell_of_markdown_or_marks_anything_up(text: str) -> None
 def test_no_text_becomes_markup_in_a_page_or_a_drawing(text: str) -> None:
     shown = str(quoted(text))
     assert re.sub(r"</?code>", "", shown).count("<") == 0
-    edge = Edge(text, text, text, text, text, text, shown=text)
+    edge = Edge(text, text, text, text, "procedures(a)", text, shown=text)
     graph = StateGraph(text, text, (edge,), initial=text, states=(text, "b"))
     plain = re.sub(r"[\x00-\x08\x0b-\x1f]", "", svg(graph))
     root = xml_of(plain)

@@ -143,7 +143,7 @@ def test_a_bug_in_the_way_of_a_text_is_told_and_the_next_text_is_looked_at(
     shown = bench.change("tables.edit", "words.rcs", **edit("# a bug, and a table\ntable w {\n}\n"))
     assert shown["known"]
     assert [each["code"] for each in shown["findings"]] == ["RCS902"]
-    assert state(shown) == "failed"
+    assert state(shown) == "undecided"
     assert bench.told["tables.file/t.rcs"]["known"]
     bench.now("tables.undo", "words.rcs")
     assert not bench.doc("words.rcs")["findings"]
@@ -162,7 +162,7 @@ def test_a_version_never_stands_for_two_texts(
         bench.ask("tables.line", file="t.rcs", version=before["version"], table="t", at=0)
     after = bench.open("t.rcs")
     assert after["version"] > before["version"]
-    assert state(after) == "failed"
+    assert state(after) == "refuted"
 
 
 @pytest.mark.parametrize("kind", ["undo", "redo", "take", "edit", "cells", "line", "delete", "column"])
@@ -237,7 +237,7 @@ def test_what_another_editor_writes_is_seen_once_it_is_at_rest(folder: Path, ben
     written.write_text(TABLE.replace("/= off", "on    "))
     assert seen() == TABLE
     assert "/= off" not in seen()
-    assert state(bench.doc("t.rcs")) == "failed"
+    assert state(bench.doc("t.rcs")) == "refuted"
     bench.change("tables.undo", "t.rcs")
     (folder / "words.rcs").write_text(WORDS.replace("off", "oft"))
     seen()

@@ -194,7 +194,7 @@ def test_a_cell_says_what_was_typed(bench: Bench) -> None:
     doc = bench.change("tables.cells", "t.rcs", table="t", line=0, column=1, rows=rows(["<= 4"]))
     assert matrix(doc, "t")[1][0] == ["a", "off", "<= 4", "1"]
     assert "  | a    | off    | <= 4 || 1   |\n" in doc["text"]
-    assert state(doc) == "failed"
+    assert state(doc) == "refuted"
     [finding] = [each for each in doc["findings"] if each["code"] == "RCS401"]
     [witness] = finding["witnesses"]
     assert witness["columns"] == ["off", "5"]
@@ -216,7 +216,7 @@ def test_half_written_cells_are_kept_and_never_called_proved(half: str, bench: B
     bench.open("t.rcs")
     doc = bench.change("tables.cells", "t.rcs", table="t", line=0, column=1, rows=rows([half]))
     assert matrix(doc, "t")[1][0][2] == half
-    assert state(doc) in ("failed", "stale")
+    assert state(doc) in ("has errors", "stale")
     assert doc["findings"]
     doc = bench.change("tables.cells", "t.rcs", table="t", line=0, column=1, rows=rows([""]))
     assert state(doc) == "proved"
@@ -356,7 +356,7 @@ def test_a_file_without_changes_follows_the_disk(folder: Path, bench: Bench) -> 
     bench.open("t.rcs")
     (folder / "t.rcs").write_text(TABLE.format(low="<= 4"))
     doc = bench.open("t.rcs")
-    assert (state(doc), doc["dirty"]) == ("failed", False)
+    assert (state(doc), doc["dirty"]) == ("refuted", False)
     bench.change("tables.line", "t.rcs", table="t", at=2)
     (folder / "t.rcs").write_text("# others\n")
     assert bench.ask("tables.open", file="t.rcs")["disk"] == "changed"
@@ -689,7 +689,7 @@ def test_two_pages_see_the_same(shipped: Path) -> None:
                     for each in (one, two)
                 ]
                 assert seen[0] == seen[1]
-                assert state(seen[0]) == "failed"
+                assert state(seen[0]) == "refuted"
                 with pytest.raises(Exception, match="meanwhile"):
                     await two.ask("tables.line", file=file, version=first["version"], table="drive", at=0)
                 await two.ask("tables.undo", file=file, version=version)

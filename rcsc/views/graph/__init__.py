@@ -20,6 +20,6 @@ pair of values that the cells leave open.
 
 Source: Haynes et al. 1984, section 8.2 and Fig. 10. Modules, in the order the data flows: `find` (the tables somebody
 names), `labels` (cells on an edge), `derive` (a table's graph, of states or of lines), `formats`, `to_table`,
-`round_trip`; `layout` and `drawing` make pictures, `composites`, `curves` and `chart` those of a page, with states
-that are drawn as one.
+`round_trip`. Of a picture: `composites` (states that are drawn as one), `chart` (what is said, and where it stands, by
+`layout` and `curves`), which the studio's page draws, and `drawing` as a file.
 """

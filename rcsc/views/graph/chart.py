@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from rcsc.views.graph import labels
 from rcsc.views.graph.composites import ArrowLine, Chart, ChartArrow, Composite, inside
 from rcsc.views.graph.curves import clear
-from rcsc.views.graph.drawing import folded as wrapped
-from rcsc.views.graph.drawing import plain
 from rcsc.views.graph.formats.state_graph import ANY, LINES, Edge
 from rcsc.views.graph.layout import Arrangement, Arrow, Frame, LayoutBox, Point
 
-LETTER_PX, TEXT_PX, BADGE_PX = 6.7, 15.0, 22.0
-"""A letter of 11 px, a line of text, and the least badge with the name of a line."""
-_PAD_PX, _LEAST_PX, _MARGIN_PX = 8.0, 56.0, 16.0
-MOST_LETTERS, MOST_TEXTS = 34, 4
-"""Of a row: letters of one of its texts, and texts; more is left to `whole`."""
+LETTER_PX, TEXT_PX, BADGE_PX, LEFT_PX = 7.3, 16.0, 24.0, 8.0
+"""A letter of 12 px (a monospaced one is 0.602 of its size wide), a line of text, the least badge with a name, and where a row begins."""
+_PAD_PX, _LEAST_PX, _MARGIN_PX = LEFT_PX, 56.0, 16.0
+MOST_TEXTS = 4
+"""Of a row; more is left to `whole`."""
 MOST_ALIKE = 6
 """Lines on an arrow that each say what they ask and do, though another says it."""
 
@@ -190,7 +188,7 @@ def _guard(edge: Edge, empty: str) -> Iterator[tuple[str, str]]:
     """Yield the condition beside the state, and the procedures that decide."""
     if edge.default:
         yield "default", edge.default
-    texts = _short(plain(edge.shown)) or ((empty,) if empty and not edge.default else ())
+    texts = _short(labels.plain(edge.shown)) or ((empty,) if empty and not edge.default else ())
     yield from (("guard", text) for text in texts)
     if edge.decided and edge.line:
         yield from (("guard", text) for text in _short(f"where {edge.decided} says so"))
@@ -213,9 +211,9 @@ def _does(edge: Edge) -> Iterator[tuple[str, str]]:
 
 def _short(text: str) -> tuple[str, ...]:
     """Return a text in a bounded number of lines of bounded length."""
-    lines = [piece for line in wrapped(text.replace("; ", ", ")) for piece in _cut(line)]
+    lines = [piece for line in labels.wrapped(text.replace("; ", ", ")) for piece in _cut(line)]
     return (
-        (*lines[: MOST_TEXTS - 1], f"{lines[MOST_TEXTS - 1][: MOST_LETTERS - 1]}…")
+        (*lines[: MOST_TEXTS - 1], f"{lines[MOST_TEXTS - 1][: labels.MOST_LETTERS - 1]}…")
         if len(lines) > MOST_TEXTS
         else (*lines,)
     )
@@ -223,9 +221,9 @@ def _short(text: str) -> tuple[str, ...]:
 
 def _cut(line: str) -> Iterator[str]:
     """Yield a line without blanks in pieces: cut after `_` or `.` where that leaves no short one."""
-    while len(line) > MOST_LETTERS:
-        at = max(line.rfind(sign, 0, MOST_LETTERS) for sign in "_.") + 1
-        at = at if at > MOST_LETTERS // 2 else MOST_LETTERS
+    while len(line) > labels.MOST_LETTERS:
+        at = max(line.rfind(sign, 0, labels.MOST_LETTERS) for sign in "_.") + 1
+        at = at if at > labels.MOST_LETTERS // 2 else labels.MOST_LETTERS
         yield line[:at]
         line = line[at:]
     yield line

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from rcsc.views.graph import labels
-from rcsc.views.graph.drawing import settled
 from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph
+from rcsc.views.graph.labels import settled
 
 LEAST_FAN = 3
 """Arrows to one state that are worth a composite state."""

@@ -7,16 +7,18 @@ heading: `procedures(begin, set_source) command_out(move_to_obj)`; commas, becau
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
 
 from rcsc.base.diagnostics.source import Source
 from rcsc.lang.model import Table
-from rcsc.lang.operator_table import NEGATION
+from rcsc.lang.operator_table import LOGIC, NEGATION, Op
 from rcsc.lang.resolve.precedence import expanded
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import ACTION_WORDS
 from rcsc.lang.syntax.spell import spell_expr
+from rcsc.views.graph.formats.state_graph import Edge, StateGraph
 
 _HEADING = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_.\[\]]*)\(")
 _OPEN, _CLOSE = "([{", ")]}"
@@ -168,3 +170,37 @@ def _rows(table: str, text: str) -> tuple[tree.Row, ...]:
     if not isinstance(declared, tree.TableDecl) or len(declared.rows) != 1:
         raise WordsError(f"`{text}` is more than a cell of a table")
     return declared.rows
+
+
+# --- for the eye ---
+
+MOST_LETTERS = 34
+"""Letters of a label's line."""
+
+
+def settled(graph: StateGraph, edge: Edge) -> Edge:
+    """Return the edge, without deciding procedures where its line can lead nowhere else from there."""
+    elsewhere = any(
+        (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target
+        for other in graph.edges
+    )
+    return edge if elsewhere or not edge.line else replace(edge, decided="")
+
+
+def plain(guard: str) -> str:
+    """Return a guard for reading: `not a` for `a = false`, and commas."""
+    short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = true(?![\w.])", r"\1", guard)
+    short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = false(?![\w.])", r"not \1", short)
+    return short if any(f" {op} " in short for op in LOGIC - {Op.AND}) else ", ".join(split(short, " and "))
+
+
+def wrapped(text: str) -> Iterator[str]:
+    """Yield the text in lines, broken after commas and before `and` or `or`."""
+    line = ""
+    for piece in re.split(r"(?<=, )|(?= (?:and|or) )", text):
+        if line and len(line) + len(piece.rstrip()) > MOST_LETTERS:
+            yield line.strip()
+            line = ""
+        line += piece
+    if line.strip():
+        yield line.strip()

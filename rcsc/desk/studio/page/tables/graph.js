@@ -12,7 +12,7 @@ function put(kind, attributes = {}, ...inside) {
   made.append(...inside.filter((one) => one !== null && one !== undefined));
   return made;
 }
-const TEXT = 15, LEFT = 8, LEAST = 0.05;
+const TEXT = 16, LEFT = 8, LEAST = 0.05;
 
 export function mount(root, bus) {
   const desk = deskOf(bus);
@@ -102,7 +102,7 @@ export function mount(root, bus) {
       if (row.line) {
         Object.entries({ tabindex: "0", role: "button", "data-focus": `${arrow ?? box.name} ${row.line} ${number}`, "aria-label": row.whole }).forEach(([name, value]) => group.setAttribute(name, value));
         group.append(put("rect", { class: "back", x: x + 2, y: top, width: box.size[0] - 4, height: row.height_px, rx: 4 }));
-        group.append(put("rect", { class: "badge", x: x + LEFT, y: top + 1.5, width: row.badge_px - 4, height: 14, rx: 7 }), put("text", { class: "number", x: x + LEFT + (row.badge_px - 4) / 2, y: top + 12 }, row.line));
+        group.append(put("rect", { class: "badge", x: x + LEFT, y: top, width: row.badge_px - 4, height: 16, rx: 8 }), put("text", { class: "number", x: x + LEFT + (row.badge_px - 4) / 2, y: top + 12 }, row.line));
         group.addEventListener("click", () => { bus.select({ table: desk.table, line: row.line }); say(row.whole); });
       }
       row.texts.forEach(([kind, text], at) => group.append(put("text", { class: kind, x: x + LEFT + row.badge_px, y: top + 12 + at * TEXT }, text)));
@@ -244,7 +244,7 @@ export function mount(root, bus) {
   /** Show where the table begins, in letters that can be read. */
   function begun() {
     if (!place.clientWidth) return;
-    scale = Math.max(0.8, Math.min(1.2, (place.clientWidth - 4) / shown.width));
+    scale = Math.max(1, Math.min(1.2, (place.clientWidth - 4) / shown.width));
     sized();
     const box = shown.boxes.find(({ kind }) => kind === "begin") ?? shown.boxes[0];
     if (box) place.scrollTo({ left: Math.max(0, (box.corner[0] + box.size[0] / 2) * scale - place.clientWidth / 2), top: Math.max(0, (box.corner[1] - 24) * scale) });
