@@ -100,3 +100,60 @@ def test_a_graph_that_is_seen_whole_needs_no_small_picture(tmp_path: Path) -> No
         seat.wait("document.querySelector('.graph-place [data-state=state5]')")
         seat.click(seat.button("Fit"))
         seat.wait(f"!{MAP}.checkVisibility()")
+
+
+STATE = "document.querySelector('.graph-place [data-state=state0] > rect')"
+AT = f"(({{ x, y }}) => [x, y].map((one) => Math.round(one.baseVal.value)))({STATE})"
+TOUCHES = """(() => {
+  const box = document.querySelector('.graph-place [data-state=state0] > rect').getBBox();
+  const near = (one, low, far) => one >= low - 2 && one <= low + far + 2;
+  const ends = [...document.querySelectorAll('.graph-place .arrow')].flatMap((arrow) => {
+    const tip = arrow.querySelector('.tip').getAttribute('d').match(/L ([\\d.-]+) ([\\d.-]+) Z/);
+    return [arrow.querySelector('.line').getPointAtLength(0), { x: Number(tip[1]), y: Number(tip[2]) }];
+  });
+  return ends.filter(({ x, y }) => near(x, box.x, box.width) && near(y, box.y, box.height)).length;
+})()"""
+"""Arrows' ends at the border of the state."""
+
+
+def test_a_state_is_moved_with_its_arrows_and_stays_there(seat: Seat) -> None:
+    """By mouse and by keys, also when the page is loaded anew; and is put back."""
+    before, ends = seat.value(AT), seat.value(TOUCHES)
+    assert ends >= 3, "the beginning's arrow, one that comes and one that goes"
+    assert not seat.value(
+        "[...document.querySelectorAll('.view-graph button')].some((one) => one.checkVisibility() && one.innerText === 'Put back')"
+    )
+    x, y = seat.value(f"((one) => [one.x + one.width / 2, one.y + 6])({STATE}.getBoundingClientRect())")
+    scale = seat.value(f"{STATE}.getBoundingClientRect().width / {STATE}.getBBox().width")
+    seat.mouse("mousePressed", x, y, held="shift")
+    for at in (20, 45, 70):
+        seat.mouse("mouseMoved", x + at * scale, y + at * scale, held="shift")
+    seat.mouse("mouseReleased", x + 70 * scale, y + 70 * scale, held="shift")
+    moved = seat.value(AT)
+    assert all(abs(now - was - 70) <= 2 for now, was in zip(moved, before, strict=True)), (before, moved)
+    assert seat.value(TOUCHES) == ends, "its arrows came with it"
+    seat.value(f"{STATE}.parentNode.focus()")
+    seat.press("shift+right", "shift+right", "shift+up")
+    by_keys = seat.value(AT)
+    assert [now - was for now, was in zip(by_keys, moved, strict=True)] == [24, -12]
+    seat.reload()
+    seat.wait("document.documentElement?.dataset.ready === 'yes'")
+    seat.press("3")
+    seat.wait(f"{STATE} && {AT}.join() === '{by_keys[0]},{by_keys[1]}'")
+    assert seat.value(TOUCHES) == ends
+    seat.click(seat.button("Put back"))
+    assert seat.value(AT) == before
+    assert not seat.said
+
+
+def test_no_line_is_drawn_by_who_moves_a_state_onto_another(seat: Seat) -> None:
+    other = "document.querySelector('.graph-place [data-state=state5] > rect')"
+    lines = seat.value("document.querySelectorAll('.graph-place .row[data-line]').length")
+    (x, y), (a, b) = (
+        seat.value(f"((one) => [one.x + one.width / 2, one.y + 6])({one}.getBoundingClientRect())")
+        for one in (STATE, other)
+    )
+    seat.mouse("mousePressed", x, y, held="shift")
+    seat.mouse("mouseMoved", a, b, held="shift")
+    seat.mouse("mouseReleased", a, b, held="shift")
+    assert seat.settled("document.querySelectorAll('.graph-place .row[data-line]').length") == lines

@@ -120,11 +120,18 @@ class Seat(Browser):
         self.mouse("mouseReleased", x, y)
         return bool(self.value("window.aimed?.() ?? true"))
 
-    def mouse(self, kind: str, x: float, y: float, buttons: int = 1) -> None:
-        """Moves the mouse, or presses or releases its left button."""
+    def mouse(self, kind: str, x: float, y: float, buttons: int = 1, held: str = "") -> None:
+        """Moves the mouse, or presses or releases its left button, while a key is held."""
         button = "left" if buttons else "none"
         self._tell(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=buttons, clickCount=1
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button=button,
+            buttons=buttons,
+            clickCount=1,
+            modifiers=MODIFIERS.get(held, 0),
         )
 
     def heap(self) -> int:

@@ -4,6 +4,7 @@ import { make, Refusal } from "../bus.js";
 import { spoken } from "../make.js";
 import { finder, overview } from "./about.js";
 import { deskOf, SIGNS } from "./desk.js";
+import { arranged, keepMoved, movedOf } from "./moved.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 function put(kind, attributes = {}, ...inside) {
@@ -21,11 +22,13 @@ export function mount(root, bus) {
   const zooms = [["−", "Smaller", 1 / 1.25], ["+", "Larger", 1.25]].map(([text, what, by]) => make("button", { type: "button", title: what, "aria-label": what, onclick: () => zoom(by) }, text));
   const fit = make("button", { type: "button", title: "The whole graph in the view: f", onclick: () => fitted() }, "Fit");
   const all = make("button", { type: "button", title: "Shut or open every composite state", onclick: () => shutAll() }, "Shut all");
+  const back = make("button", { type: "button", hidden: true, title: "Every state where it stood before it was moved", onclick: () => putBack() }, "Put back");
   const place = make("div", { class: "graph-place", "data-keys": "own", tabindex: "-1" });
   const whole = make("div", { class: "graph-whole", role: "status", "aria-live": "polite" });
   const map = overview(place), find = finder(place, (text) => say(text), () => map.draw());
-  root.append(make("div", { class: "bar" }, find.field, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, ...zooms, fit, proof, words), make("div", { class: "graph-room" }, place, map.canvas), whole);
+  root.append(make("div", { class: "bar" }, find.field, make("form", { onsubmit: (event) => { event.preventDefault(); chosen.set(named, state.value.trim()); ask(true); } }, state), all, back, ...zooms, fit, proof, words), make("div", { class: "graph-room" }, place, map.canvas), whole);
 
+  let laid = null, moved = {}, left = null; // the sheet as it came, how far its states were moved, and where its left end stays meanwhile
   let shown = null, key = "", scale = 1, asking = null, from = null, hint = "", said = [], drawn = null;
   const shut = new Map(); // by file and table: a set
   const chosen = new Map(); // by file and table: the state variable that was named
@@ -58,7 +61,9 @@ export function mount(root, bus) {
       if (signal.aborted || answer.table !== desk.table) return;
       const other = !shown;
       place.classList.remove("stale");
-      shown = { ...answer, file: desk.file };
+      laid = { ...answer, file: desk.file };
+      moved = movedOf(named);
+      left = null;
       draw();
       if (other) begun();
     } catch (error) {
@@ -75,8 +80,11 @@ export function mount(root, bus) {
   // --- drawing ---
 
   function draw() {
+    shown = arranged(laid, moved);
+    back.hidden = shown === laid;
     const held = document.activeElement?.closest?.(".graph-place [data-focus]")?.dataset.focus;
     const svg = put("svg", { viewBox: `0 0 ${shown.width} ${shown.height}`, width: shown.width * scale, height: shown.height * scale, role: "group", "aria-label": `Graph of table ${shown.table}` });
+    if (left !== null) svg.style.marginLeft = `${left}px`; // what grows to the right does not slip from under the hand
     const over = put("g", {});
     for (const frame of shown.frames) svg.append(framed(frame));
     for (const [at, arrow] of shown.arrows.entries()) {
@@ -137,7 +145,7 @@ export function mount(root, bus) {
       put("rect", { x, y, width, height, rx: 7 }));
     head.addEventListener("focusin", () => say(box.rows.map(({ whole: text }) => text).join("\n")));
     if (box.kind === "shut") head.addEventListener("click", () => toggle(box.name));
-    else if (box.kind === "state") head.addEventListener("pointerdown", (event) => drag(event, box));
+    if (box.kind === "state" || box.kind === "shut") head.addEventListener("pointerdown", (event) => { if (event.shiftKey) pull(event, box); else if (box.kind === "state") drag(event, box); });
     group.append(head);
     rowsOf(group, box);
     for (const text of group.querySelectorAll(".words")) text.setAttribute("pointer-events", "none");
@@ -264,6 +272,36 @@ export function mount(root, bus) {
     addEventListener("pointerup", () => { removeEventListener("pointermove", move); place.classList.remove("dragged"); }, { once: true });
   });
 
+  // --- states that are moved ---
+
+  function shift(name, right, down) {
+    const [x, y] = moved[name] ?? [0, 0], [left, top] = laid.boxes.find((box) => box.name === name).corner;
+    moved = { ...moved, [name]: [Math.max(-left, x + right), Math.max(-top, y + down)] };
+    draw();
+  }
+  function putBack() {
+    moved = {};
+    left = null;
+    keepMoved(named, moved);
+    if (laid) draw();
+    place.focus({ preventScroll: true });
+  }
+  /** Move a state by the pointer; it stays where it is let go, also when the page is loaded anew. */
+  function pull(event, box) {
+    if (event.button !== 0) return;
+    left = corner(place.querySelector("svg"))[0] - corner(place)[0] + place.scrollLeft;
+    let [x, y] = point(event);
+    const move = (at) => {
+      const [a, b] = point(at);
+      shift(box.name, a - x, b - y);
+      [x, y] = [a, b];
+    };
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", () => { removeEventListener("pointermove", move); keepMoved(named, moved); }, { once: true });
+    event.preventDefault();
+    event.currentTarget.focus({ preventScroll: true });
+  }
+
   // --- drawing an arrow ---
 
   function begin(name) {
@@ -332,6 +370,11 @@ export function mount(root, bus) {
       done();
       if (from && focus.dataset.state) finish(focus.dataset.state);
       else focus.dispatchEvent(new MouseEvent("click", { bubbles: true }));
+    } else if (/^Arrow/.test(event.key) && focus && event.shiftKey && focus.classList.contains("state") && !event.ctrlKey) {
+      done();
+      const [right, down] = { ArrowRight: [12, 0], ArrowLeft: [-12, 0], ArrowDown: [0, 12], ArrowUp: [0, -12] }[event.key];
+      if (laid.boxes.some(({ name, kind }) => name === focus.closest(".box").dataset.name && kind !== "any")) shift(focus.closest(".box").dataset.name, right, down);
+      keepMoved(named, moved);
     } else if (/^Arrow/.test(event.key) && focus && !event.ctrlKey) { done(); near(focus, event.key); } else if (event.ctrlKey && event.key.toLowerCase() === "z") { done(); if (event.shiftKey) desk.redo(); else desk.undo(); } else if (event.key === "+" || event.key === "-") { done(); zoom(event.key === "+" ? 1.25 : 0.8); } else if (event.key === "f" && !event.ctrlKey) { done(); fitted(); } else if (event.key === "/") { done(); find.field.focus(); }
   });
 
@@ -362,7 +405,7 @@ export function mount(root, bus) {
   }
 
   desk.on(() => { proved(); ask(); });
-  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"], ["/", "Find a state or a line: Enter the next, Shift+Enter the one before"]]) {
+  for (const [keys, what] of [["a", "Draw an arrow from the state, then choose where it ends"], ["arrows", "Go to what is next"], ["shift and arrows, or shift and drag", "Move the state; it stays there, Put back undoes that"], ["enter", "Select the line; shut or open a composite state"], ["+ and -, or ctrl and the wheel", "Larger and smaller"], ["f", "The whole graph in the view"], ["/", "Find a state or a line: Enter the next, Shift+Enter the one before"]]) {
     bus.keys.push({ keys: `In the graph: ${keys}`, what, run: () => {}, where: "Graph" });
   }
   return { shown: () => { ask(); marks(); } };
