@@ -317,6 +317,16 @@ def test_whoever_declares_it_for_the_first_time_is_told_what_to_write(
     assert any(help_ in text for text in told), diagnostics
 
 
+def test_a_level_with_the_name_of_its_table_is_told_who_shares_names() -> None:
+    """What one writes first, and again."""
+    diagnostics = compile_text(
+        "input a : bool\ntable t {\n | line | a ||\n | x | ||\n}\nlevel t { table t }\n"
+    )
+    assert isinstance(diagnostics, tuple)
+    [found] = [one for one in diagnostics if one.code.value == "RCS202"]
+    assert found.help == ("give one of them another name: no two have the same among tables and levels",)
+
+
 @pytest.mark.parametrize("name", ["arm", "boss"])
 def test_a_neighbour_is_declared_once(name: str) -> None:
     diagnostics = compile_text(LEVEL.replace("commands hand", f"commands {name}"))

@@ -386,6 +386,33 @@ def test_a_requirement_has_a_standing(
     assert '<span class="bad">refuted: ' in Path("trace/trace.html").read_text(encoding="utf-8")
 
 
+def test_a_declared_requirement_has_a_standing_under_its_own_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No list has to have it; what a run breaks is told, and is no longer only *not proved here*."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", ".", "--template", "level"]) == 0
+    gripper = Path("gripper.rcs")
+    text = gripper.read_text(encoding="utf-8")
+    gripper.write_text(f"{text}\nrequirement hand : never command_to_hand = close\n", encoding="utf-8")
+    Path("system.toml").write_text(
+        'name = "hand"\ngenerated = "generated"\ntick_ms = 40\n\n[[level]]\nname = "gripper"\nprogram = "gripper"\n',
+        encoding="utf-8",
+    )
+    trace = ["trace", "gripper.rcs", "--no-vectors"]
+    assert run(trace) == 0
+    assert "7 lines, 7 with a requirement" in capsys.readouterr().out
+    assert '<span class="for">hand</span>' in Path("trace/trace.html").read_text(encoding="utf-8")
+    assert run(["prove", "system.toml"]) == 1
+    capsys.readouterr()
+    Path("names.txt").write_text("", encoding="utf-8")
+    for options in ([], ["--requirements", "names.txt"]):
+        assert run([*trace, *options]) == 1
+        said = " ".join(capsys.readouterr().out.split())
+        assert "requirement `hand` is refuted: requirement hand is refuted: `rcsc prove` shows" in said
+        assert "not in the list" not in said
+
+
 def test_rows_of_scripts_test_requirements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Told apart from the vectors, which are made of the tables; of a script of another kind there is nothing to tell."""
     folder = tmp_path / "dock"

@@ -37,6 +37,15 @@ INMODE = "inmode"
 BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
 
+_SHARED = {
+    "table": "no two have the same among tables and levels",
+    "call": "no two have the same among procedures and owners",
+    "value": "no two have the same among constants, sets, inputs, states and outputs",
+    "assumption": "no two have the same among assumptions, invariants, properties and requirements",
+}
+"""Whose names are of one space."""
+
+
 @dataclass(frozen=True, slots=True)
 class Constant:
     """A named constant, and whether it takes any unit (it was written without one)."""
@@ -159,7 +168,11 @@ class Scope:
         key = f"{space} {name.text}"
         if key in self.places:
             first = Label(self.places[key], "first declared here")
-            self.report(Code.DUPLICATE_NAME, f"`{name.text}` is declared twice", name.span, related=(first,))
+            shared = _SHARED.get(space, "")
+            help_ = f"give one of them another name{f': {shared}' if shared else ''}"
+            self.report(
+                Code.DUPLICATE_NAME, f"`{name.text}` is declared twice", name.span, help_, related=(first,)
+            )
             return False
         self.places[key] = name.span
         return True

@@ -300,6 +300,6 @@ def _closing(matrices: Sequence[Matrix], names: Sequence[str]) -> str:
 
 def _figures(one: Matrix) -> str:
     pieces = f"{len(one.pieces)} pieces of {len({piece.file for piece in one.pieces})} files"
-    named = sum(bool(line.answers) for line in one.lines)
+    named = sum(bool(line.answers or line.properties) for line in one.lines)
     lines = f"{len(one.lines)} lines, {named} with a requirement, " if one.lines else ""
     return f"{lines}{pieces}, {len(one.untraced) or 'none'} from nothing"

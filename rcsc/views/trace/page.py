@@ -3,7 +3,7 @@
 In: matrices. Out: HTML.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import groupby
 
@@ -11,7 +11,7 @@ from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
 from rcsc.views.pages.documents import framed, led, listing, row, spoken, tabled
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
-from rcsc.views.trace.requirements import Standing, standings
+from rcsc.views.trace.requirements import Standing, standings, stated
 from rcsc.views.trace.tables_of import spots
 
 _ABOUT = (
@@ -31,7 +31,7 @@ def page(matrices: Sequence[Matrix], listed: Sequence[str]) -> str:
         "<h1>Traceability</h1>",
         f"<p>{_ABOUT}</p>",
         f"<nav>{''.join(links)}</nav>",
-        *_requirements(standings(matrices), listed),
+        *_requirements(standings(matrices), listed, stated(matrices)),
         *(part for one in matrices for part in _program(one)),
     ]
     return framed("Traceability", body)
@@ -44,17 +44,23 @@ def _led(matrix: Matrix, path: str, line: int | str, shown: str) -> str:
     return led(path, line, shown)
 
 
-def _requirements(known: Mapping[str, Sequence[Standing]], listed: Sequence[str]) -> Iterator[str]:
+def _requirements(
+    known: Mapping[str, Sequence[Standing]], listed: Sequence[str], own: Collection[str]
+) -> Iterator[str]:
     yield "<h2>Requirements</h2>"
     names = dict.fromkeys((*listed, *known))
     if not names:
-        yield "<p>No line and no declaration names one: a column <code>req</code> of a table does.</p>"
+        yield "<p>None is declared, and no line names one: a column <code>req</code> of a table does.</p>"
         return
     if listed:
         yield f"<p>{sum(name in known for name in listed)} of {len(listed)} in the list have a place.</p>"
     rows = []
     for name in names:
-        note = ' <span class="bad">not in the list</span>' if listed and name not in listed else ""
+        note = (
+            ' <span class="bad">not in the list</span>'
+            if listed and name not in listed and name not in own
+            else ""
+        )
         head = f'<span class="for">{escape(name)}</span>{note}'
         if name not in known:
             rows.append(row(head, '<span class="bad">nothing is for it</span>', NONE, NONE, NONE))

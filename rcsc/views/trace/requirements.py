@@ -93,7 +93,17 @@ def _named(matrix: Matrix) -> Iterator[tuple[str, Standing]]:
         here = _standing(f"{one.sort} {one.name}", one.proof, [*_lines_of(matrix, one)])
         if one.sort == SCRIPT:  # made of what the requirement says, and not of the tables
             here = replace(here, tests=f"`{one.states}`, made by `rcsc run`")
-        yield from ((name, here) for name in one.requirements)
+        yield from ((name, here) for name in one.requirements or _own(one))
+
+
+def _own(one: Declared) -> tuple[str, ...]:
+    """Return the name of a requirement that is declared, and is for none that has a name elsewhere."""
+    return (one.name,) if one.sort == "requirement" and not one.requirements else ()
+
+
+def stated(matrices: Iterable[Matrix]) -> frozenset[str]:
+    """Return the names of the requirements that are declared, and for none that a list would have."""
+    return frozenset(name for matrix in matrices for one in matrix.declared for name in _own(one))
 
 
 def of_scripts(system: Path) -> Iterator[Declared]:
@@ -156,7 +166,7 @@ def refuted(matrices: Sequence[Matrix]) -> Iterator[Diagnostic]:
 
 def findings(matrices: Sequence[Matrix], wanted: Sequence[str], file: Path) -> Iterator[Diagnostic]:
     """Report each listed requirement that nothing names, each named one that is not listed, and lines that name none."""
-    known = places(matrices)
+    known, own = places(matrices), stated(matrices)
     at = Label(Span(str(file), 0, 0))
     for name in wanted:
         if name not in known:
@@ -166,7 +176,7 @@ def findings(matrices: Sequence[Matrix], wanted: Sequence[str], file: Path) -> I
                 help=(f"did you mean `{near[0]}`, which the tables name?",) if near else (),
             )  # fmt: skip
     for name, where in known.items():
-        if name not in wanted:
+        if name not in wanted and name not in own:
             near = get_close_matches(name, wanted, 1)
             yield Diagnostic(
                 Code.REQUIREMENT_OPEN, f"requirement `{name}` is not in the list", at,
