@@ -244,7 +244,7 @@ def test_the_bar_of_verdicts_says_of_what_is_proved_and_what_nobody_asked(docks:
     with seated(Opening(docks)) as seat:
         seat.until(
             "#verdict summary",
-            "tables proved: whatever comes in, exactly one line matches; 2 under assumptions",
+            "tables proved: whatever comes in, exactly one line matches; 2 trusting assumptions",
         )
         seat.until("#verdict summary", "requirements not asked")
         seat.click("#verdict summary")

@@ -1,5 +1,6 @@
 """The start page, of a real `rcsc studio` in a browser: my tables, a new project, what is found in published tables."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -13,6 +14,7 @@ import pytest
 
 from rcsc.front.commands import run as rcsc
 from tests.studio.driven import Seat
+from tests.studio.served import Refused, page_at
 
 pytestmark = pytest.mark.needs("chromium")
 COMMAND = (sys.executable, "-c", "from rcsc.front.commands import main; main()", "studio")
@@ -151,3 +153,25 @@ def test_what_a_browser_keeps_of_a_project_it_finds_again(tmp_path: Path) -> Non
     with studio(tmp_path, "door") as (_, again):
         assert again.split("/")[2] == port
         assert again != address, "the token is new"
+
+
+def test_a_page_makes_and_opens_nothing_but_what_is_listed_or_new(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "note").touch()
+    asked = (
+        ("start.make", {"folder": "\0", "template": "level"}, "does not print"),
+        ("start.make", {"folder": "mine", "template": "level"}, "not empty"),
+        ("start.make", {"folder": "new", "template": "../level"}, "none of level"),
+        ("start.look", {"entry": "..", "file": "system.toml"}, "none of cia402"),
+        ("start.look", {"entry": "tcas", "file": "../../system.toml"}, "none of published.rcs"),
+    )
+
+    async def refused(address: str) -> None:
+        async with page_at(address) as one:
+            for kind, body, why in asked:
+                with pytest.raises(Refused, match=why):
+                    await one.ask(kind, **body)
+
+    with studio(tmp_path) as (_, address):
+        asyncio.run(refused(address))
+    assert {one.name for one in tmp_path.iterdir() if not one.name.startswith(".")} == {"mine"}

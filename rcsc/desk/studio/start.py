@@ -14,7 +14,7 @@ from pathlib import Path
 from rcsc.base.diagnostics.coded import Refused
 from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files import write_atomically
-from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, text
+from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, plain, text
 from rcsc.base.host.trust import state_folder
 from rcsc.desk.shell.opening import Opening
 from rcsc.desk.studio.hub import Ask, Concern, Hub, Json
@@ -91,7 +91,11 @@ class Start(Concern):
     def _on_list(self, ask: Ask) -> Json:
         """Return everything that may be opened or made."""
         recent = [
-            {"path": path, "name": Path(path).name, "kind": "system" if path.endswith(".toml") else "tables"}
+            {
+                "path": path,
+                "name": "/".join(Path(path).parts[-2:]),  # of many the last part is system.toml
+                "kind": "system" if path.endswith(".toml") else "tables",
+            }
             for path in recently()
             if Path(path).exists()
         ]
@@ -105,12 +109,14 @@ class Start(Concern):
 
     def _on_open(self, ask: Ask) -> Json:
         """Open a path: a system, a file of tables, or a folder of either."""
-        return self._choose(self._starts.mean(self._starts.here / Path(ask.body.text("path")).expanduser()))
+        return self._choose(
+            self._starts.mean(self._starts.here / Path(plain(ask.body.text("path"))).expanduser())
+        )
 
     def _on_make(self, ask: Ask) -> Json:
         """Make a project of a template, and open it."""
         kind = ask.body.one_of("template", tuple(self._starts.templates))
-        named = ask.body.text("folder").strip()
+        named = plain(ask.body.text("folder").strip())
         if not named:
             raise Refused(Code.STUDIO, "the new project needs a folder", "name one that is not there yet")
         folder = self._starts.here / Path(named).expanduser()

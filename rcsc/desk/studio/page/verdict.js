@@ -78,7 +78,7 @@ function tablesSaid({ ok, tables = [], findings = [] }) {
   const wrong = findings.filter(({ severity }) => severity === "error").length;
   if (!ok) return ["wrong", `✗ not proved: ${wrong} ${wrong === 1 ? "finding" : "findings"}`];
   const rest = tables.filter(({ assumptions }) => assumptions.length).length;
-  return ["good", `✓ ${tables.length} ${tables.length === 1 ? "table" : "tables"} proved: whatever comes in, exactly one line matches${rest ? `; ${rest} under assumptions` : ""}`];
+  return ["good", `✓ ${tables.length} ${tables.length === 1 ? "table" : "tables"} proved: whatever comes in, exactly one line matches${rest ? `; ${rest} trusting assumptions` : ""}`];
 }
 
 function requiredSaid(required) {
