@@ -11,12 +11,12 @@ from typing import Any
 import jsonschema
 import pytest
 
-from rcsc.base.host.cache import FOLDER, Cache
+from rcsc.base.host.cache import FOLDER, Cache, open_cache
 from rcsc.base.host.files.plain import plain, read
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.invariant.cubes import as_condition
 from rcsc.compose.proof.standing import KnownSystem, KnownVerdict, SystemOutline, standing
-from rcsc.driver import outline
+from rcsc.driver import outline, requirements
 from rcsc.front.commands import run
 from rcsc.lang.interpret import initial, run_table
 from rcsc.lang.model import Apply, Bool, Op, Read, VariableName
@@ -614,3 +614,24 @@ def test_a_condition_of_two_parts_stays_one_beside_others_in_what_is_printed() -
     chosen, nameable = (either, Predicate("c", Bool())), frozenset("abc")
     assert as_condition(chosen, [((0, 1), (1, 1))], nameable) == "not ((a or b) and c = true)"
     assert as_condition(chosen, [((0, 0), (1, 1))], nameable) == "not (not (a or b) and c = true)"
+
+
+def test_a_claim_is_refuted_until_any_level_changes(tmp_path: Path) -> None:
+    """The run that breaks it is one that the neighbours can make as they are; until `prove` shows one it is open."""
+    folder = tmp_path / "cart"
+    assert run(["new", str(folder), "--template", "system"]) == 0
+    with (folder / "axis.rcs").open("a", encoding="utf-8") as file:
+        file.write("\nrequirement stands : always speed_mm_s = 0 [mm/s]\n")
+
+    def state() -> str:
+        cache = open_cache(folder)
+        every = requirements.known_requirements(requirements.read(folder / "system.toml", cache), cache)
+        return next(one.state for one in every if one.stated.name == "stands")
+
+    assert state() == "unknown"
+    assert run(["prove", str(folder), "--trace", "0"]) == 1
+    assert state() == "open"
+    assert run(["prove", str(folder)]) == 1
+    assert state() == "refuted"
+    edit_file(folder / "supervisor.rcs", ("move(target_mm := 0)", "move(target_mm := 1)"))
+    assert state() in {"open", "unknown"}

@@ -90,24 +90,6 @@ def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
     return None if kept is None else Verdicts(dict(kept.claims), kept.open, kept.unstated)
 
 
-@dataclass(frozen=True, slots=True)
-class _Refuted:
-    """The claims of a level that a run breaks, which every executor repeated."""
-
-    keys: tuple[Key, ...]
-
-
-def keep_refuted(cache: Cache, content: str, keys: frozenset[Key]) -> None:
-    """Keep which claims of a level of this content a run breaks, with those that were known before."""
-    cache.store(_Refuted(tuple(sorted(keys | refuted_of(cache, content)))), "refuted", content)
-
-
-def refuted_of(cache: Cache, content: str) -> frozenset[Key]:
-    """Return the claims of a level of this content that a run is known to break."""
-    kept = cache.load(_Refuted, "refuted", content)
-    return frozenset(() if kept is None else kept.keys)
-
-
 def any_kept(cache: Cache) -> bool:
     """Return whether levels were ever proved into this cache."""
     return cache.load(_AnyLevel) is not None
@@ -157,6 +139,30 @@ class SystemOutline:
     assumed: tuple[Promise, ...]
 
 
+# --- what was refuted ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Refuted:
+    """The claims of the levels of a system that a run breaks, which every executor repeated; each with its level first."""
+
+    needs: tuple[Need, ...]
+
+
+def keep_refuted(cache: Cache, outline: SystemOutline, needs: frozenset[Need]) -> None:
+    """Keep which claims of a system a run breaks, with those that were known before.
+
+    A run is one that the neighbours, as they are, can make: when any level changes, nothing is known to be refuted.
+    """
+    cache.store(_Refuted(tuple(sorted(needs | refuted_of(cache, outline)))), repr(outline))
+
+
+def refuted_of(cache: Cache, outline: SystemOutline) -> frozenset[Need]:
+    """Return the claims of a system as it is that a run is known to break."""
+    kept = cache.load(_Refuted, repr(outline))
+    return frozenset(() if kept is None else kept.needs)
+
+
 # --- what is known of it -----------------------------------------------------------------------
 
 
@@ -167,13 +173,13 @@ class KnownSystem:
     Attributes:
         outline: The system.
         known: The kept verdicts by level.
-        refuted: The claims of each level that a run is known to break.
+        refuted: The claims that a run is known to break.
         closed: Each claim with all that it rests on.
     """
 
     outline: SystemOutline
     known: Mapping[str, Verdicts]
-    refuted: Mapping[str, frozenset[Key]] = field(default_factory=dict)
+    refuted: frozenset[Need] = frozenset()
     closed: Mapping[Need, Closed] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -224,8 +230,7 @@ class KnownSystem:
 
     def is_refuted(self, level: str, key: Key) -> bool:
         """Return whether a run is known that breaks an obligation which is not proved."""
-        broken = key in self.refuted.get(level, ())
-        return broken and self._obligation(level, key) is KnownVerdict.NOT_PROVED
+        return (level, key) in self.refuted and self._obligation(level, key) is KnownVerdict.NOT_PROVED
 
     def _given(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an accepted claim that rests on one that is not accepted: conditional, or unknown."""
@@ -289,6 +294,5 @@ class KnownSystem:
 def standing(cache: Cache, outline: SystemOutline) -> KnownSystem:
     """Return the cache's verdicts on a system."""
     kept = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
-    refuted = {level.name: refuted_of(cache, level.content) for level in outline.levels}
     known = {name: verdicts for name, verdicts in kept.items() if verdicts is not None}
-    return KnownSystem(outline, known, refuted)
+    return KnownSystem(outline, known, refuted_of(cache, outline))

@@ -569,12 +569,9 @@ def _explanations(
 
 def _keep_refuted(cache: Cache | None, outlined: SystemOutline, explanations: Sequence[Explanation]) -> None:
     """Keep which claims were refuted: what the studio and `rcsc trace` say of them afterwards."""
-    if cache is None:
-        return
-    for level in outlined.levels:
-        broken = (each for each in explanations if each.refutes and each.level == level.name)
-        if keys := frozenset(each.obligation.key for each in broken):
-            keep_refuted(cache, level.content, keys)
+    needs = frozenset((each.level, each.obligation.key) for each in explanations if each.refutes)
+    if cache is not None and needs:
+        keep_refuted(cache, outlined, needs)
 
 
 def run_cases(cases: tuple[Path, ...]) -> int:
