@@ -287,6 +287,24 @@ def test_the_system_is_a_picture_in_which_a_buffer_is_told_broken_and_mended(doc
         assert "NaN" not in seat.value("document.querySelector('.system svg').outerHTML")
 
 
+def test_the_bar_of_verdicts_says_under_which_timing_something_is_proved(tmp_path: Path) -> None:
+    """What holds as scheduled alone is not called proved for every run."""
+    cart = tmp_path / "cart"
+    assert rcsc(["new", str(cart), "--template", "system"]) == 0
+    assert rcsc(["prove", str(cart)]) == 0
+    with seated(Opening(cart / "system.toml")) as seat:
+        seat.until("#verdict summary", "requirements proved")
+        said = seat.value(
+            "[...document.querySelectorAll('#verdict li')].map(({ textContent }) => textContent)"
+        )
+        [scheduled] = [line for line in said if "Proved as scheduled, for no other timing: " in line]
+        assert {"pause_stands", "done_stands"} <= set(re.findall(r"\w+", scheduled))
+        assert not [line for line in said if "every run" in line and "pause_stands" in line]
+        seat.press("q")
+        seat.until("[data-name=pause_stands] td", "proved as scheduled")
+        assert not seat.said
+
+
 def test_the_bar_of_verdicts_asks_of_no_assumption_whether_it_is_proved(tmp_path: Path) -> None:
     """It is taken for granted, and told so."""
     assumed = "assume presses_long assumed : on for at least 2 cycles, bumper\n\nlevel drive {"

@@ -354,7 +354,7 @@ function requiredTab(bus) {
   const sums = make("span", { class: "grow soft", role: "status" });
   const open = (one) => bus.try("log.open", { name: one.log }).then((answer) => { if (answer) bus.say(`the run that breaks \`${one.name}\` is shown to everybody`); });
   function row(one) {
-    const verdict = make("td", {}, make("strong", { class: STANDS[one.state] ?? "soft" }, one.state), " ", make("span", { class: "soft" }, ...spoken(one.words)));
+    const verdict = make("td", {}, make("strong", { class: STANDS[one.state] ?? "soft" }, one.state), " ", make("span", { class: "soft" }, ...spoken(one.words.startsWith(one.state) ? one.words.slice(one.state.length).replace(/^[:,;]? /, "") : one.words)));
     if (one.log) verdict.append(" ", make("button", { type: "button", "aria-label": `Show the run that breaks ${one.name}`, onclick: () => open(one) }, "Show its run"));
     return make("tr", { "data-state": one.state, "data-name": one.name }, make("td", {}, make("code", {}, one.name), make("div", { class: "soft" }, one.level ? `${one.word} of ${one.level}` : `${one.word} across levels`), one.req.length ? make("div", { class: "soft" }, one.req.join(", ")) : null),
       make("td", { class: "code", title: one.doc }, one.text, make("div", { class: "soft" }, one.place)), verdict,

@@ -4,6 +4,7 @@ import { make, spoken } from "./make.js";
 import { deskOf } from "./tables/desk.js";
 
 const NOT = { refuted: ["wrong", "refuted"], open: ["warn", "open"], conditional: ["warn", "conditional"], unknown: ["soft", "not asked"] }; // as the bar tells them, in this order
+const TIMED = { any: "Proved for every run, under any timing", late: "Proved as scheduled, and with buffers as late as the system allows", scheduled: "Proved as scheduled, for no other timing" };
 
 export function verdicts(bus, place, show) {
   const desk = deskOf(bus);
@@ -47,7 +48,7 @@ export function verdicts(bus, place, show) {
       ...required.filter(({ state }) => state === "open").map((one) => item("warn", named(one, "is open: neither proved nor refuted"), ["Read why", () => show("run").then(() => bus.tell("drawer", "required"))])),
       ...required.filter(({ state }) => state === "conditional").map((one) => item("warn", named(one, `is conditional: ${one.words}`))),
       ...together(required.filter(({ state }) => state === "unknown"), (some) => item("soft", ["Nobody has asked yet whether ", ...names(some), ` ${some.length === 1 ? "holds" : "hold"} over time`], prove)),
-      ...together(required.filter(({ state }) => state === "proved"), (some) => item("good", ["Proved for every run: ", ...names(some)], ["Read how", () => show("run").then(() => bus.tell("drawer", "required"))])),
+      ...Object.entries(TIMED).flatMap(([timing, text]) => together(required.filter((one) => one.state === "proved" && one.timing === timing), (some) => item("good", [`${text}: `, ...names(some)], ["Read how", () => show("run").then(() => bus.tell("drawer", "required"))]))),
       ...together(required.filter(({ state }) => state === "assumed"), (some) => item("warn", ["Taken for granted of what stands outside: ", ...names(some)])),
       ...(build.tables ?? []).filter(({ assumptions }) => assumptions.length).map(({ table, assumptions }) => item("warn", ["Table ", make("code", {}, table), " takes for granted: ", ...listed(assumptions.map(({ name, standing }) => [make("code", {}, name), standing === "monitored" ? ", which runs watch" : ""]))])),
     ];
