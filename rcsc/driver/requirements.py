@@ -32,6 +32,7 @@ _STATES = {
     KnownVerdict.TRUSTED: "proved",
     KnownVerdict.PARTLY: "proved",
     KnownVerdict.CONDITIONAL: "conditional",
+    KnownVerdict.REFUTED: "refuted",
     KnownVerdict.NOT_PROVED: "open",
     KnownVerdict.UNKNOWN: "unknown",
 }
@@ -155,7 +156,7 @@ def _of_level(its: Read, level: str, stated: Property, where: str) -> KnownRequi
     if its.known is None or verdict is KnownVerdict.UNKNOWN:
         return KnownRequirement(level, stated, where, "unknown", NOBODY_ASKED)
     closed = its.known.closed.get((level, key), UNKNOWN)
-    state = "refuted" if its.known.is_refuted(level, key) else _STATES[verdict]
+    state = _STATES[verdict]
     trusts = declared(closed.trusts)
     words = {
         "proved": f"proved under any timing{report.trusting(trusts)}",

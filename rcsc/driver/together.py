@@ -135,6 +135,8 @@ class _Seen:
             known: tuple(name for name, state in states.items() if state is known) for known in KnownVerdict
         }
         proved, conditional = by[KnownVerdict.PROVED], by[KnownVerdict.CONDITIONAL]
+        broken = {KnownVerdict.REFUTED, KnownVerdict.NOT_PROVED}
+        not_proved = tuple(name for name, state in states.items() if state in broken)
         unreached = tuple(line for line in at[0].unreached if all(line in place.unreached for place in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
@@ -150,9 +152,7 @@ class _Seen:
         trusts = tuple(
             dict.fromkeys(word for place in at for claim in claims for word in place.trusts(*claim))
         )
-        together = InSystem(
-            system, proved, by[KnownVerdict.NOT_PROVED], unreached, conditional, rests, trusts
-        )
+        together = InSystem(system, proved, not_proved, unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
     def _say(self, system: str, known_system: KnownSystem | None, *, wanted: bool) -> None:
@@ -293,6 +293,7 @@ def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:
 def _worst(states: Collection[KnownVerdict]) -> KnownVerdict:
     """Return the worst state among several levels; unknown where none knows anything."""
     order = (
+        KnownVerdict.REFUTED,
         KnownVerdict.NOT_PROVED,
         KnownVerdict.UNKNOWN,
         KnownVerdict.CONDITIONAL,

@@ -19,7 +19,7 @@ from rcsc.views.evidence import collect as collecting
 from rcsc.views.evidence import whole as kinds
 from rcsc.views.evidence.kind import Evidence, Kind
 from rcsc.views.evidence.whole import Whole
-from rcsc.views.pages.documents import spoken
+from rcsc.views.pages.frame import quoted
 
 REPO = Path(__file__).parents[2]
 DOCK, PAPER = REPO / "tests/data/dock/system.toml", REPO / "tables/system.toml"
@@ -91,7 +91,8 @@ def test_what_is_not_looked_at_is_named_in_the_index(
     capsys.readouterr()
     index = (tmp_path / "out" / "index.html").read_text("utf-8")
     assert '<h2 id="dock">dock</h2>' in index
-    assert "<li>" + spoken(f"dock.c is not looked at: {kinds.PASSES['runtime']}") + "</li>" in index
+    told = f"dock.c is not looked at: {kinds.PASSES['runtime']}"
+    assert f"<li>{quoted(told)}</li>" in index
 
 
 def test_of_programs_of_one_name_none_is_lost_in_silence(

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from rcsc.proof.solvers.options import Options
 from rcsc.views.graph.chart import MOST_TEXTS, Sheet, SheetBox, sheet
-from rcsc.views.graph.composites import Chart, collapsed, folded
+from rcsc.views.graph.composites import Chart, collapsed, folded, settled
 from rcsc.views.graph.derive import Derived, derive
 from rcsc.views.graph.find import NotFound, tables
 from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph
-from rcsc.views.graph.labels import MOST_LETTERS, settled
+from rcsc.views.graph.labels import MOST_LETTERS
 from rcsc.views.graph.layout import Point
 
 REPO = Path(__file__).parents[2]

@@ -38,6 +38,7 @@ class KnownVerdict(StrEnum):
     TRUSTED = "assumed"  # the tables declare it, of what comes from outside
     PARTLY = "proved as far as it was looked at"
     CONDITIONAL = "conditional"  # accepted given what it rests on, of which something is not proved
+    REFUTED = "refuted"  # of an obligation: a run breaks it
     NOT_PROVED = "not proved"
     UNKNOWN = "unknown"  # this content was never proved, or the solver gave up
 
@@ -218,6 +219,8 @@ class KnownSystem:
     def of_obligation(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an obligation over the whole chain of levels."""
         known = self._obligation(level, key)
+        if known is KnownVerdict.NOT_PROVED and (level, key) in self.refuted:
+            return KnownVerdict.REFUTED
         if known is not KnownVerdict.PROVED:
             return known
         if not self._proved(level, key):
@@ -227,10 +230,6 @@ class KnownSystem:
             if self._closed(level, key).verdict is Verdict.TRUSTED
             else KnownVerdict.PROVED
         )
-
-    def is_refuted(self, level: str, key: Key) -> bool:
-        """Return whether a run is known that breaks an obligation which is not proved."""
-        return (level, key) in self.refuted and self._obligation(level, key) is KnownVerdict.NOT_PROVED
 
     def _given(self, level: str, key: Key) -> KnownVerdict:
         """Return the state of an accepted claim that rests on one that is not accepted: conditional, or unknown."""

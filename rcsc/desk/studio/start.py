@@ -16,6 +16,7 @@ from rcsc.base.diagnostics.codes import Code
 from rcsc.base.host.files import write_atomically
 from rcsc.base.host.files.read import MIB, CheckedFields, Malformed, json_of, plain, text
 from rcsc.base.host.trust import state_folder
+from rcsc.code.testing.figures import counted
 from rcsc.desk.shell.opening import Opening
 from rcsc.desk.studio.hub import Ask, Concern, Hub, Json
 
@@ -56,7 +57,7 @@ class Starts:
     Attributes:
         here: The folder that the studio was started in.
         templates: By name, what a project may begin with.
-        gallery: The folder of the published tables.
+        gallery: The folders of published tables, by the names of their entries.
         mean: Finds what a path means; raises `CodedError` where it is nothing that can be opened.
         make: Makes a project, of a template or of an entry of the gallery, in a folder; raises `CodedError` where it cannot.
         scratch: A folder for copies of published tables; it is gone when the studio has ended.
@@ -64,7 +65,7 @@ class Starts:
 
     here: Path
     templates: Mapping[str, str]
-    gallery: Traversable
+    gallery: Mapping[str, Traversable]
     mean: Callable[[Path], Next]
     make: Callable[[Path, str], None]
     scratch: Callable[[], Path]
@@ -104,7 +105,7 @@ class Start(Concern):
             "recent": recent,
             "found": list(_found(self._starts.here, ask)),
             "templates": [{"name": name, "text": said} for name, said in self._starts.templates.items()],
-            "gallery": [_entry(each) for each in _entries(self._starts.gallery)],
+            "gallery": [_entry(each) for each in self._starts.gallery.values()],
         }
 
     def _on_open(self, ask: Ask) -> Json:
@@ -125,8 +126,8 @@ class Start(Concern):
 
     def _on_look(self, ask: Ask) -> Json:
         """Open a file of an entry of the gallery, or a system of it whose levels are then proved together; of a copy."""
-        entry = ask.body.one_of("entry", tuple(each.name for each in _entries(self._starts.gallery)))
-        file = ask.body.one_of("file", _to_open(self._starts.gallery / entry))
+        entry = ask.body.one_of("entry", tuple(self._starts.gallery))
+        file = ask.body.one_of("file", _to_open(self._starts.gallery[entry]))
         folder = self._starts.scratch() / entry
         if not folder.exists():
             self._starts.make(folder, entry)
@@ -190,7 +191,7 @@ def _found(here: Path, ask: Ask) -> Iterator[Json]:
         for one in systems or ([folder] if tables else []):
             name = str(one.relative_to(here))
             kind = "system" if one.suffix == ".toml" else "tables"
-            files = f"{len(tables)} {'file' if len(tables) == 1 else 'files'}" if kind == "tables" else ""
+            files = counted(len(tables), "file") if kind == "tables" else ""
             yield {"path": str(one), "name": name, "kind": kind, "files": files}
             told += 1
 
@@ -206,12 +207,6 @@ def _is_system(path: Path) -> bool:
 
 
 # --- published tables ---
-
-
-def _entries(gallery: Traversable) -> list[Traversable]:
-    if not gallery.is_dir():
-        return []
-    return sorted((each for each in gallery.iterdir() if each.is_dir()), key=lambda each: each.name)
 
 
 def _to_open(entry: Traversable) -> tuple[str, ...]:

@@ -38,10 +38,10 @@ BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
 
 
 _SHARED = {
-    "table": "no two have the same among tables and levels",
-    "call": "no two have the same among procedures and owners",
-    "value": "no two have the same among constants, sets, inputs, states and outputs",
-    "assumption": "no two have the same among assumptions, invariants, properties and requirements",
+    "table": "tables and levels",
+    "call": "procedures and owners",
+    "value": "constants, sets, inputs, states and outputs",
+    "assumption": "assumptions, invariants, properties and requirements",
 }
 """Whose names are of one space."""
 
@@ -168,8 +168,8 @@ class Scope:
         key = f"{space} {name.text}"
         if key in self.places:
             first = Label(self.places[key], "first declared here")
-            shared = _SHARED.get(space, "")
-            help_ = f"give one of them another name{f': {shared}' if shared else ''}"
+            among = f": no two have the same among {_SHARED[space]}" if space in _SHARED else ""
+            help_ = f"give one of them another name{among}"
             self.report(
                 Code.DUPLICATE_NAME, f"`{name.text}` is declared twice", name.span, help_, related=(first,)
             )

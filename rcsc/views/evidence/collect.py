@@ -84,7 +84,7 @@ def collect(
             of_one[name] = looks.at(name, missed, settings.progress)
             diagnostics += _findings(looks.root, name, of_one[name])
         diagnostics += looks.code.stale
-        made[looks.name] = Part(looks.name, looks.root, looks.tables, looks.code, of_one)
+        made[looks.name] = Part(looks.root, looks.tables, looks.code, of_one)
     settings.progress("")
     making = Making(by, date, settings, {name: KINDS[name].versions() for name in names})
     files = _files(making, made)
@@ -191,12 +191,12 @@ def _files(making: Making, made: Mapping[str, Part]) -> dict[str, str]:
 def _texts(made: Mapping[str, Part]) -> dict[str, str]:
     """Return the tables and the C that were looked at, by path."""
     tables = {path: text(Path(path)) for part in made.values() for path in part.tables}
-    return tables | {_path(part, path): c for part in made.values() for path, c in part.c.items()}
+    return tables | {_path(name, part, path): c for name, part in made.items() for path, c in part.c.items()}
 
 
-def _path(part: Part, path: str) -> str:
+def _path(name: str, part: Part, path: str) -> str:
     """Return where a file of C lies; of C that lies nowhere, where its dossier keeps it."""
-    return str(part.code.folder / path) if part.code.folder is not None else f"{part.name}/code/{path}"
+    return str(part.code.folder / path) if part.code.folder is not None else f"{name}/code/{path}"
 
 
 def _dossier(making: Making, made: Mapping[str, Part], texts: Sequence[str]) -> Dossier:
@@ -207,7 +207,7 @@ def _dossier(making: Making, made: Mapping[str, Part], texts: Sequence[str]) -> 
             name,
             part.source,
             part.code.words,
-            [(_path(part, path), sha256(c)) for path, c in sorted(part.c.items())],
+            [(_path(name, part, path), sha256(c)) for path, c in sorted(part.c.items())],
             [_shown(name, kind, evidence) for kind, evidence in part.kinds.items()],
         )
         for name, part in made.items()

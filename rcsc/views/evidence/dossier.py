@@ -38,13 +38,11 @@ class Part:
     """A program or system of a dossier.
 
     Attributes:
-        name: Of its folder.
         tables: Files that it is declared in.
         code: Its C, as it was looked at.
         kinds: Its evidence.
     """
 
-    name: str
     source: str
     tables: tuple[str, ...]
     code: CodeFound
@@ -187,10 +185,7 @@ def superseded(folder: Path, files: Collection[str]) -> Iterator[Path]:
         files: Paths below it that this one has.
     """
     try:
-        document = CheckedFields(json_of(text(folder / RECORD)), RECORD)
-        kept = dict(_digests(document, "pages"))
-        for program in document.each("programs", MOST_PROGRAMS):
-            kept |= _digests(program, "reports")
+        kept = _of_the_folder(CheckedFields(json_of(text(folder / RECORD)), RECORD))
     except (OSError, Malformed):
         return
     for path, digest in kept.items():
@@ -215,11 +210,10 @@ def held(folder: Path) -> Conclusion:
     """
     document = CheckedFields(json_of(text(folder / RECORD)), RECORD)
     document.whole("form", FORM, FORM)
-    digests = {str(folder / path): sha for path, sha in _digests(document, "pages").items()}
+    digests = {str(folder / path): sha for path, sha in _of_the_folder(document).items()}
     looked: dict[str, str] = {}
     for program in document.each("programs", MOST_PROGRAMS):
         looked |= {**_digests(program, "tables"), **_digests(program, "code")}
-        digests |= {str(folder / path): sha for path, sha in _digests(program, "reports").items()}
     beside = set(_paths(document.value.get("not_looked_at", [])))
     known = {**looked, **digests}
     changed = [one for path, sha in sorted(known.items()) if (one := _differs(Path(path), sha))]
@@ -232,6 +226,14 @@ def held(folder: Path) -> Conclusion:
     made = f"made {document.text('date')} by {document.text('by')} with rcsc {tool}"
     same = f"{len(known) - len(changed)} of {len(known)} files are those of {folder}"
     return Conclusion(Report(found), f"{same}, {made}")
+
+
+def _of_the_folder(document: CheckedFields) -> dict[str, str]:
+    """Return the digests of what lies in the folder of a record: pages and reports, by path below it."""
+    found = _digests(document, "pages")
+    for program in document.each("programs", MOST_PROGRAMS):
+        found |= _digests(program, "reports")
+    return found
 
 
 def _digests(program: CheckedFields, key: str) -> dict[str, str]:

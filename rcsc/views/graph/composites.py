@@ -21,7 +21,6 @@ from itertools import groupby
 
 from rcsc.views.graph import labels
 from rcsc.views.graph.formats.state_graph import ANY, Edge, StateGraph
-from rcsc.views.graph.labels import settled
 
 LEAST_FAN = 3
 """Arrows to one state that are worth a composite state."""
@@ -121,6 +120,15 @@ def folded(graph: StateGraph) -> Chart:
         {state: tuple(rows) for state, rows in stays.items()},
         {state: _doing(state, edges) for state in graph.states},
     )
+
+
+def settled(graph: StateGraph, edge: Edge) -> Edge:
+    """Return the edge, without deciding procedures where its line can lead nowhere else from there."""
+    elsewhere = any(
+        (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target
+        for other in graph.edges
+    )
+    return edge if elsewhere or not edge.line else replace(edge, decided="")
 
 
 def inside(composites: Sequence[Composite], state: str) -> str:

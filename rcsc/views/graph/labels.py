@@ -7,7 +7,6 @@ heading: `procedures(begin, set_source) command_out(move_to_obj)`; commas, becau
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import lru_cache
 
 from rcsc.base.diagnostics.source import Source
@@ -18,7 +17,6 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import ACTION_WORDS
 from rcsc.lang.syntax.spell import spell_expr
-from rcsc.views.graph.formats.state_graph import Edge, StateGraph
 
 _HEADING = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_.\[\]]*)\(")
 _OPEN, _CLOSE = "([{", ")]}"
@@ -176,15 +174,6 @@ def _rows(table: str, text: str) -> tuple[tree.Row, ...]:
 
 MOST_LETTERS = 34
 """Letters of a label's line."""
-
-
-def settled(graph: StateGraph, edge: Edge) -> Edge:
-    """Return the edge, without deciding procedures where its line can lead nowhere else from there."""
-    elsewhere = any(
-        (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target
-        for other in graph.edges
-    )
-    return edge if elsewhere or not edge.line else replace(edge, decided="")
 
 
 def plain(guard: str) -> str:

@@ -89,9 +89,3 @@ def listing(words: Iterable[str], style: str = "") -> str:
     """Return words one below the other, as a cell."""
     cell = "<br>".join(map(escape, words))
     return f'<span class="{style}">{cell}</span>' if style and cell else cell
-
-
-def spoken(text: str) -> str:
-    """Return a sentence whose names stand in backticks, with these set apart."""
-    parts = escape(text).split("`")
-    return "".join(f"<code>{part}</code>" if at % 2 else part for at, part in enumerate(parts))

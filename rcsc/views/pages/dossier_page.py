@@ -11,7 +11,9 @@ from html import escape
 from itertools import groupby
 from operator import attrgetter
 
-from rcsc.views.pages.documents import framed, led, row, spoken, tabled
+from rcsc.code.testing.figures import counted
+from rcsc.views.pages.documents import framed, led, row, tabled
+from rcsc.views.pages.frame import quoted
 
 _PLACE = re.compile(r"(?P<file>[^:\s]+\.(?:c|h|rcs)):(?P<line>\d+)")
 _NONE = '<span class="soft">none</span>'
@@ -92,7 +94,7 @@ class Dossier:
 
 def dossier_page(dossier: Dossier) -> str:
     """Return the page."""
-    body = ["<h1>Evidence</h1>", *(f"<p>{spoken(line)}</p>" for line in dossier.made)]
+    body = ["<h1>Evidence</h1>", *(f"<p>{quoted(line)}</p>" for line in dossier.made)]
     body += ["<h2>What it comes to</h2>", _overview(dossier)]
     body += ["<h2>Tools</h2>", _table({"kind": 16, "tool": 24, "version": 60}, dossier.tools)]
     for program in dossier.programs:
@@ -122,16 +124,15 @@ def _overview(dossier: Dossier) -> str:
 
 def _comes_to(kind: ShownKind) -> str:
     if kind.missing:
-        return f'<span class="bad">shows nothing: {spoken(kind.missing)}</span>'
+        return f'<span class="bad">shows nothing: {quoted(kind.missing)}</span>'
     if kind.lacks:
-        count = len(kind.lacks)
-        return f'<span class="bad">lacks {count} {"point" if count == 1 else "points"}</span>'
+        return f'<span class="bad">lacks {counted(len(kind.lacks), "point")}</span>'
     return "lacks nothing"
 
 
 def _program(program: ShownProgram, texts: Sequence[str]) -> Iterator[str]:
     yield f'<h2 id="{escape(program.name)}">{escape(program.name)}</h2>'
-    yield f"<p>Of {_linked(program.source, texts)}. Looked at: {spoken(program.looked_at)}.</p>"
+    yield f"<p>Of {_linked(program.source, texts)}. Looked at: {quoted(program.looked_at)}.</p>"
     rows = (row(_linked(path, texts), f"<code>{digest}</code>") for path, digest in program.code)
     yield tabled({"C": 40, "SHA-256": 60}, rows) if program.code else "<p>There is no C of it.</p>"
     for kind in program.kinds:
@@ -142,12 +143,12 @@ def _program(program: ShownProgram, texts: Sequence[str]) -> Iterator[str]:
 def _kind(program: ShownProgram, kind: ShownKind, texts: Sequence[str]) -> Iterator[str]:
     own = {path.rpartition("/")[2]: path for path, _ in program.code}
     if kind.missing:
-        yield f'<p><span class="bad">Shows nothing: {spoken(kind.missing)}</span></p>'
+        yield f'<p><span class="bad">Shows nothing: {quoted(kind.missing)}</span></p>'
         return
-    yield f"<ul>{''.join(f'<li>{spoken(line)}</li>' for line in kind.figures)}</ul>"
+    yield f"<ul>{''.join(f'<li>{quoted(line)}</li>' for line in kind.figures)}</ul>"
     if kind.lacks:
         yield '<p class="bad">What it lacks</p>'
-        rows = (row(_placed(where, own, texts), spoken(what)) for where, what in kind.lacks)
+        rows = (row(_placed(where, own, texts), quoted(what)) for where, what in kind.lacks)
         yield tabled({"where": 25, "what, and why": 75}, rows)
     else:
         yield "<p>It lacks nothing.</p>"
@@ -166,7 +167,7 @@ def _accepted(points: Sequence[AcceptedPoint], own: Mapping[str, str], texts: Se
     known = attrgetter("rule", "reason")
     for (rule, reason), same in groupby(sorted(points, key=known), key=known):
         places = ", ".join(_placed(where, own, texts) for where in dict.fromkeys(one.where for one in same))
-        yield row(spoken(rule), spoken(reason), places)
+        yield row(quoted(rule), quoted(reason), places)
 
 
 def _placed(where: str, own: Mapping[str, str], texts: Sequence[str]) -> str:
@@ -174,7 +175,7 @@ def _placed(where: str, own: Mapping[str, str], texts: Sequence[str]) -> str:
     found = _PLACE.fullmatch(where)
     path = "" if found is None else own.get(found["file"], found["file"])
     if found is None or path not in texts:
-        return spoken(where)
+        return quoted(where)
     return led(path, found["line"], escape(where))
 
 

@@ -55,6 +55,7 @@ _SAID = {
     KnownVerdict.PROVED: "proved of the levels together",
     KnownVerdict.TRUSTED: "proved of the levels together, trusting assumptions that are declared",
     KnownVerdict.CONDITIONAL: "conditional: rests on what is not proved",
+    KnownVerdict.REFUTED: REFUTED,
     KnownVerdict.NOT_PROVED: OPEN,
 }
 SURVIVES = "survives"
@@ -266,8 +267,7 @@ def _known(program: Program, cache: Cache) -> Iterator[tuple[str, str]]:
             if own.get(key[2]) == file:
                 state = standing.of_obligation(level.name, key)
                 if state in _SAID:
-                    words = REFUTED if standing.is_refuted(level.name, key) else _SAID[state]
-                    yield key[2], f"{words}, {os.path.relpath(system)}"
+                    yield key[2], f"{_SAID[state]}, {os.path.relpath(system)}"
 
 
 def _of_system(plans: dict[str, Plan], path: Path, its: Read | None, cache: Cache | None) -> Matrix:

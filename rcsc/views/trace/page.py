@@ -9,7 +9,8 @@ from itertools import groupby
 
 from rcsc.code.emit.plan import Origin, Sort
 from rcsc.code.emit.rendering import Piece
-from rcsc.views.pages.documents import framed, led, listing, row, spoken, tabled
+from rcsc.views.pages.documents import framed, led, listing, row, tabled
+from rcsc.views.pages.frame import quoted
 from rcsc.views.trace.matrix import Declared, Matrix, TracedLine
 from rcsc.views.trace.requirements import Standing, standings, stated
 from rcsc.views.trace.tables_of import spots
@@ -66,9 +67,9 @@ def _requirements(
             rows.append(row(head, '<span class="bad">nothing is for it</span>', NONE, NONE, NONE))
         for at, one in enumerate(known.get(name, ())):
             verdict = (
-                f'<span class="bad">{spoken(one.verdict)}</span>'
+                f'<span class="bad">{quoted(one.verdict)}</span>'
                 if one.refuted or one.open
-                else spoken(one.verdict)
+                else quoted(one.verdict)
             )
             tests, shown = escape(one.tests) or NOT_MADE, escape(one.coverage) or NOT_MADE
             rows.append(
@@ -178,9 +179,9 @@ def _declared(matrix: Matrix, one: Declared) -> str:
     return row(
         f'<b>{escape(one.name)}</b><br><span class="soft">{escape(one.sort)}, {_place(matrix, one.place)}</span>',
         listing(one.requirements, "for") or NONE,
-        spoken(one.states) or NONE,
+        quoted(one.states) or NONE,
         escape(", ".join(one.used)) or NONE,
-        spoken(one.proof) or NONE,
+        quoted(one.proof) or NONE,
     )
 
 

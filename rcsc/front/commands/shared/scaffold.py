@@ -38,17 +38,17 @@ starts_at_zero = true
 """
 
 
-def shipped_tables() -> Traversable:
+def _shipped_tables() -> Traversable:
     """Return the folder of the tables that come with rcsc."""
     packaged = files("rcsc") / "_data" / "tables"
     beside: Traversable = Path(__file__).parents[4] / "tables"
     return packaged if packaged.is_dir() else beside
 
 
-def gallery() -> tuple[str, ...]:
-    """Return the names of the entries of the gallery, sorted."""
-    entries = (shipped_tables() / GALLERY).iterdir()
-    return tuple(sorted(entry.name for entry in entries if entry.is_dir()))
+def gallery() -> dict[str, Traversable]:
+    """Return the folders of the gallery's entries by their names, sorted."""
+    entries = (entry for entry in (_shipped_tables() / GALLERY).iterdir() if entry.is_dir())
+    return {entry.name: entry for entry in sorted(entries, key=lambda entry: entry.name)}
 
 
 def make(folder: Path, kind: str) -> tuple[list[str], list[str]] | Diagnostic:
@@ -81,7 +81,7 @@ def make(folder: Path, kind: str) -> tuple[list[str], list[str]] | Diagnostic:
 
 def _files(kind: str) -> Iterator[tuple[str, bytes]]:
     """Yield the files of a project by their paths in it, in order."""
-    tables = shipped_tables()
+    tables = _shipped_tables()
     if kind not in TEMPLATES:
         yield "rcsc.toml", _SETTINGS
         here = re.compile(

@@ -33,7 +33,7 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.eventually import waiting
 from rcsc.compose.proof.level import LevelProof, certificate
 from rcsc.compose.proof.notices import notices
-from rcsc.compose.proof.standing import SystemOutline, keep_refuted
+from rcsc.compose.proof.standing import keep_refuted
 from rcsc.compose.proof.system import (
     SystemProof,
     lines_in,
@@ -116,7 +116,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
     """
     stood = digest_at(str(path))
     systems, loaded = read_systems(path)
-    outlined = outline(systems)
+    as_read = systems
     sources = {file: source for files in loaded.values() for file, source in files.sources.items()}
     names = _known(asked.only, systems) or tuple(systems)
     programs = {spec.name: spec.program for spec in description(path).levels}
@@ -163,7 +163,7 @@ def proved(path: Path, asked: Asked, cache: Cache | None, key: tuple[str, ...]) 
         _say(line for each in coverages.values() for line in lines_of(each, sources))
         across.say_runs(systems, given)
     explanations = _explanations(path, systems, proof, asked, settings)
-    _keep_refuted(None if asked.begins else cache, outlined, explanations)
+    _keep_refuted(None if asked.begins else cache, as_read, explanations)
     if asked.as_json:
         found = [explanation_as_json(systems, explanation, settings) for explanation in explanations]
         _say(_lines(path, systems, proof, asked, sources, _More(found, coverages, given)))
@@ -567,11 +567,13 @@ def _explanations(
     return explanations
 
 
-def _keep_refuted(cache: Cache | None, outlined: SystemOutline, explanations: Sequence[Explanation]) -> None:
+def _keep_refuted(
+    cache: Cache | None, systems: Mapping[str, TransitionSystem], explanations: Sequence[Explanation]
+) -> None:
     """Keep which claims were refuted: what the studio and `rcsc trace` say of them afterwards."""
     needs = frozenset((each.level, each.obligation.key) for each in explanations if each.refutes)
     if cache is not None and needs:
-        keep_refuted(cache, outlined, needs)
+        keep_refuted(cache, outline(systems), needs)
 
 
 def run_cases(cases: tuple[Path, ...]) -> int:

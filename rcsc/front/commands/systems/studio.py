@@ -19,7 +19,7 @@ from rcsc.base.host.trust import Agreement
 from rcsc.desk.shell.opening import Opening
 from rcsc.front.commands.shared.extras import need
 from rcsc.front.commands.shared.paths import There
-from rcsc.front.commands.shared.scaffold import GALLERY, TEMPLATES, make, shipped_tables
+from rcsc.front.commands.shared.scaffold import TEMPLATES, gallery, make
 from rcsc.front.commands.shared.systems import ATTACH, EXECUTOR, PLANT, SYSTEM, NoSystem, meant, tables_meant
 from rcsc.lang.project import project_root
 from rcsc.run.description import description
@@ -172,9 +172,12 @@ def _told(
 ) -> None:  # bound by `partial`
     """Print where the studio is, or, the address being known, what is open there now."""
     click.echo(f"now open there: {_name(chosen)}" if chosen and number else f"the studio is at {address}")
-    if chosen is not None and chosen.opening.path.is_file() and not _agreement(chosen).given:
-        folder = _agreement(chosen).folder
-        click.echo(f"none of the code in {folder} runs before the page, or --trust, says that it may")
+    if chosen is not None and chosen.opening.path.is_file():
+        agreement = _agreement(chosen)
+        if not agreement.given:
+            click.echo(
+                f"none of the code in {agreement.folder} runs before the page, or --trust, says that it may"
+            )
     if opens and not number:
         click.launch(held.enter_context(door(address)).as_uri())
 
@@ -223,7 +226,7 @@ def _starts(held: contextlib.ExitStack) -> "Starts":
             raise Refused(refused.code, refused.message, "name a folder that is not there yet, or is empty")
 
     copies = cache(lambda: held.enter_context(scratch("gallery")))
-    return Starts(Path.cwd(), TEMPLATES, shipped_tables() / GALLERY, mean, made, copies)
+    return Starts(Path.cwd(), TEMPLATES, gallery(), mean, made, copies)
 
 
 def _drawer(path: Path) -> "Drawer | None":
